@@ -18,7 +18,7 @@ class Audit:
     """Check the covariances of trajectories against the truth: consistent, overconfident, or too cautious.
 
     Several trajectories with a truth for each are runs of one estimator and are pooled; with one truth for all they are
-    different estimators and are compared.
+    different estimators and are compared. Without a truth, runs of one back end are pooled, and graphs are.
     """
 
     trajectories: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="TRAJECTORY")] = ()
@@ -38,9 +38,13 @@ class Audit:
     """Compare two trajectories of one drive that were estimated from two halves of its data, without any truth."""
     space: Literal["plane", "space"] = "plane"
     """Audit x, y and heading, or all six axes of poses with position, quaternion and a 6 x 6 covariance."""
+    g2o_rotation: Literal["vector", "quaternion"] | None = None
+    """What the rotational information of a g2o graph in space is of: rotation vectors, as GTSAM reads it (used if not
+    given), or x y z of quaternions, which are half as large, as g2o itself reads it."""
     error: Literal["additive", "body", "world"] | None = None
     """Frame of the stated covariances: additive error of x, y, heading (used if not given; in space of x y z and the
-    turns about these fixed axes), or log(est^-1 true) in the body frame, or log(true est^-1) in the world frame."""
+    turns about these fixed axes), or log(est^-1 true) in the body frame, or log(true est^-1) in the world frame. Those
+    of a g2o graph are of the body frame (used if not given), and are converted into another."""
     align: Literal["none", "start", "all"] = "none"
     """Bring the first pose to the true one before comparing, or the whole path nearest to the true path."""
     reference_sigma: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="M RAD")] = None
@@ -58,8 +62,9 @@ class Audit:
         """Run the command and return its exit status; raises UsageError for bad input."""
         audited = audit(
             self.trajectories, truth=self.truth, reference=self.reference, relations=self.relations,
-            without_truth=self.without_truth, halves=self.halves, space=self.space, error=self.error, align=self.align,
-            reference_sigma=self.reference_sigma, nearest=self.nearest, topic=self.topic, truth_topic=self.truth_topic,
+            without_truth=self.without_truth, halves=self.halves, space=self.space,
+            g2o_rotation=self.g2o_rotation, error=self.error, align=self.align, reference_sigma=self.reference_sigma,
+            nearest=self.nearest, topic=self.topic, truth_topic=self.truth_topic,
         )  # fmt: skip
         found(**audited.record())
         for line in audited.verdict:

@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import gammaincinv
+from scipy.special import gammainc, gammaincinv
 
 
 @lru_cache(maxsize=256)
@@ -12,6 +12,11 @@ def gate_level(probability: float, dof: int) -> float:
     """Return the squared Mahalanobis distance that stays below it with this probability: a chi-square quantile."""
     # As scipy.stats has it, which takes longer to import than all else that this package needs.
     return 2.0 * float(gammaincinv(0.5 * dof, probability))
+
+
+def mean_inside(probability: float, dof: int) -> float:
+    """Return the mean of a chi-square over its degrees of freedom among the values below its level: less than 1."""
+    return float(gammainc(0.5 * dof + 1.0, 0.5 * gate_level(probability, dof))) / probability
 
 
 @lru_cache(maxsize=256)

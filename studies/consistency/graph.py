@@ -5,7 +5,7 @@ observation. Errors are written out anew and differentiated numerically; nothing
 `chainslam.slam.estimation.models`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from chainslam.experiments.replays.replay import Association, ReplayOptions, rep
 from chainslam.experiments.scenario import TrialConfig
 from chainslam.experiments.terminal.console import plain_console
 from chainslam.slam.backends.graph.graph import Graph
+from chainslam.slam.backends.graph.record import Record
 from chainslam.slam.geometry.lines import lines_to_world, normals
 from chainslam.slam.geometry.poses import wrap
 
@@ -42,14 +43,19 @@ class Problem:
     anchors: Float[np.ndarray, "l 2"]
 
     @classmethod
-    def of(cls, arrays: Mapping[str, np.ndarray]) -> "Problem":
-        """Take the problem out of what `Graph.arrays` returns."""
-        used = arrays["seen_line"] >= 0
-        line = np.searchsorted(arrays["line_ids"], arrays["seen_line"][used])
+    def of(cls, record: Record) -> "Problem":
+        """Take the problem out of a graph's record, from the pose on that saw the first wall."""
+        told = [(row, each) for row, line in enumerate(record.lines.values()) for each in line.observations]
         return cls(
-            arrays["prior_pose_world"], arrays["prior_cov"], arrays["odometry"], arrays["odometry_cov"],
-            arrays["seen"][used], arrays["seen_from"][used], line, arrays["line_anchors"],
-        )  # fmt: skip
+            record.frame.pose_world,
+            record.frame.cov,
+            np.array([odometry.motion for odometry in record.motions]),
+            np.array([odometry.cov for odometry in record.motions]),
+            np.array([each.seen for _, each in told]),
+            np.array([each.pose for _, each in told]),
+            np.array([row for row, _ in told]),
+            np.array([line.anchor for line in record.lines.values()]),
+        )
 
     def solve(
         self, poses: Float[np.ndarray, "n 3"], lines: Float[np.ndarray, "l 2"], rounds: int = 30
@@ -128,16 +134,14 @@ def differences(graph: Graph) -> dict[str, float]:
     `sigma_share` is the largest relative error of the sigmas of the last pose and the lines, `covariance` the largest
     error of their joint covariance in units of the sigmas.
     """
-    arrays, trajectory = graph.arrays(), graph.trajectory()
-    problem = Problem.of(arrays)
+    record, problem = graph.record, Problem.of(graph.record)
     belief = graph.belief
-    joint, shown = belief.joint(belief.ids), np.flatnonzero(arrays["line_shown"])
-    _, of_poses = np.unique(arrays["poses_of_steps"], return_index=True)
-    found = trajectory[of_poses]
-    # The graph's origin is the pose that saw the first wall: lines no longer shown begin where it linearised them.
-    lines = lines_to_world(arrays["lines"], found[int(arrays["first_pose"])])
+    joint, shown = belief.joint(belief.ids), np.flatnonzero([line.shown for line in record.lines.values()])
+    # The graph's origin is the pose that saw the first wall; lines are in its frame.
+    lines = lines_to_world(graph.lines(), record.frame.pose_world)
     lines[:, 1] -= np.sum(normals(lines[:, 0]) * problem.anchors, axis=-1)
-    lines[shown] = belief.means
+    _, of_poses = np.unique(record.steps, return_index=True)
+    found = graph.trajectory()[of_poses][len(record.lead) :]
     poses, truth, cov = problem.solve(found, lines)
     off, lines_off = np.abs(wrap(poses - found)), np.abs(wrap(truth - lines)[shown])
     of_lines = 3 * len(poses) + 2 * shown[:, None] + np.arange(2)

@@ -5,7 +5,6 @@ observations of the same lines, the same questions in between.
 """
 
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +21,7 @@ from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.robot import Odometry
 
 from ..runner.command import run_study
-from .graph import differences
+from .graph import Problem, differences
 
 SETTINGS: dict[str, GraphConfig] = {
     "as it is": GraphConfig(),
@@ -36,22 +35,22 @@ SETTINGS: dict[str, GraphConfig] = {
 }
 
 
-def told_again(arrays: Mapping[str, np.ndarray], config: GraphConfig) -> tuple[Graph, float]:
-    """Tell another graph what `Graph.arrays` holds; return it and the processor time of a step, s.
+def told_again(problem: Problem, config: GraphConfig) -> tuple[Graph, float]:
+    """Tell another graph what one was told; return it and the processor time of a step, s.
 
     After each motion it is asked for the joint covariance of what is seen next, as matching does. New lines are grown
     before the rest is entered: two pieces of one new wall may be in one scan.
     """
-    graph = Graph(arrays["prior_pose_world"], arrays["prior_cov"], config)
-    seen, lines_seen, seen_from = arrays["seen"], arrays["seen_line"], arrays["seen_from"]
+    graph = Graph(problem.prior, problem.prior_cov, config)
+    seen, lines_seen, seen_from = problem.seen, problem.line, problem.seen_from
     cov = seen[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
     centres = seen[:, 1:2] * normals(seen[:, 0]) + (seen[:, 3] / seen[:, 2])[:, None] * directions(seen[:, 0])
     ids: dict[int, int] = {}
     begin = time.process_time()
-    for pose in range(len(arrays["odometry"]) + 1):
+    for pose in range(len(problem.odometry) + 1):
         if pose:
-            graph.predict(Odometry(arrays["odometry"][pose - 1], arrays["odometry_cov"][pose - 1]))
-        numbers = np.flatnonzero((seen_from == pose) & (lines_seen >= 0))
+            graph.predict(Odometry(problem.odometry[pose - 1], problem.odometry_cov[pose - 1]))
+        numbers = np.flatnonzero(seen_from == pose)
         _, firsts = np.unique(lines_seen[numbers], return_index=True)
         new = numbers[[at for at in sorted(firsts) if int(lines_seen[numbers[at]]) not in ids]]
         known = np.setdiff1d(numbers, new)
@@ -65,7 +64,7 @@ def told_again(arrays: Mapping[str, np.ndarray], config: GraphConfig) -> tuple[G
         observed = Observations(matched, seen[known, :2], cov[known])
         graph.update(observed, observed)
     _ = graph.belief
-    return graph, (time.process_time() - begin) / (len(arrays["odometry"]) + 1)
+    return graph, (time.process_time() - begin) / (len(problem.odometry) + 1)
 
 
 @dataclass(frozen=True)
@@ -84,13 +83,13 @@ class SettingsStudy:
         run = record(TrialConfig(self.world, "full-ekf", seed=self.seed, max_steps=self.max_steps))
         graph = replay(run, "graph", ReplayOptions("true", perfect_extraction=True)).scenario.backend
         assert isinstance(graph, Graph)
-        arrays = graph.arrays()
-        table = Table(title=f"{self.world}, seed {self.seed}: {len(arrays['odometry'])} poses, true association")
+        problem = Problem.of(graph.record)
+        table = Table(title=f"{self.world}, seed {self.seed}: {len(problem.odometry)} poses, true association")
         for column in ("", "pose mm", "deg", "line mm", "deg", "sigma", "covariance", "ms a step"):
             table.add_column(column)
-        told_again(arrays, GraphConfig())  # What is compiled is loaded.
+        told_again(problem, GraphConfig())  # What is compiled is loaded.
         for words, config in SETTINGS.items():
-            again, spent = told_again(arrays, config)
+            again, spent = told_again(problem, config)
             table.add_row(words, *(f"{value:.4f}" for value in differences(again).values()), f"{1e3 * spent:.2f}")
         plain_console().print(table)
 

@@ -6,7 +6,7 @@ from chainslam.experiments.replays.recordings import record
 from chainslam.experiments.replays.replay import ReplayOptions, replay
 from chainslam.experiments.scenario import TrialConfig
 from chainslam.slam.backends.graph.config import GraphConfig
-from studies.consistency.graph import differences
+from studies.consistency.graph import Problem, differences
 from studies.consistency.graph_settings import told_again
 
 MILLIMETRE, HUNDREDTH_DEGREE = 1.0, 0.01
@@ -29,8 +29,8 @@ def test_the_graph_is_the_dense_solution_of_a_real_log_without_being_asked_to_li
 
 def test_told_again_the_graph_is_the_same_and_linearised_less_often_it_is_farther_off(run):
     first = replay(run, "graph", ReplayOptions("true", perfect_extraction=True)).scenario.backend
-    again, _ = told_again(first.arrays(), GraphConfig())
-    rarely, _ = told_again(first.arrays(), GraphConfig(relinearise_angle_rad=1.0, relinearise_place_m=9.0, loose=9.0))
+    again, _ = told_again(Problem.of(first.record), GraphConfig())
+    rarely, _ = told_again(Problem.of(first.record), GraphConfig(relinearise_angle_rad=1.0, relinearise_place_m=9.0))
     off = differences(again)
     assert off["line_mm"] == pytest.approx(differences(first)["line_mm"], abs=1e-3)
     assert differences(rarely)["line_mm"] > 2 * off["line_mm"]

@@ -9,13 +9,14 @@ from jaxtyping import Float, Int
 from chainslam.slam.evaluation.consistency import anees, nees, whitened
 
 from ...scoring.trajectories import rms
-from ...scoring.without_truth.relation_noise import sigmas_of_relations
-from ...scoring.without_truth.relations import Relations, between, nearest_rows, same_scan_s
+from ...scoring.without_truth.relations import Relations, nearest_rows, same_scan_s
 from ...usage import UsageError
 from .against import paired
-from .draws import LEVELS, Score, score
-from .geometry.kinds import geometry_of, parts, since_start
-from .reading.stated import Frame, Stated
+from .draws import LEVELS, Cross, Score, joint_dof, score
+from .geometry.kinds import geometry_of, misclosures, parts, since_start
+from .geometry.plane import Frame
+from .reading.relative import relative
+from .reading.stated import Stated
 from .suspicions import check, definite, hints, order_hint
 from .verdicts import Verdict, judge
 
@@ -23,6 +24,8 @@ Align = Literal["none", "start", "all"]
 LAGS = (1, 10, 100)
 LEAST = 10
 """Poses that an audit needs."""
+EXACT = 1e-9
+"""Errors below it, m and rad, in all poses are those of a copy."""
 DEFAULT: Frame = "additive"
 KNOWN_START = (1e-8, 1e-10)
 """Of position and rotation relative to the start: the variances of a start that is known, as `--p0 zero` has it."""
@@ -38,10 +41,9 @@ class Options:
     """How errors are taken."""
 
     error: Frame | None = None
-    """The frame that the covariances are stated in; None takes the file's own, or the additive one."""
+    """The frame that the covariances are stated in, or that those of a graph are converted into; None takes its own."""
     align: Align = "none"
-    reference_sigma: tuple[float, float] | None = None
-    """Standard deviations of a reference, m and rad."""
+    reference_sigma: tuple[float, float] | None = None  # of a reference, m and rad
     nearest_s: float | None = None
 
 
@@ -136,7 +138,7 @@ def _figures(of: Score) -> dict[str, Any]:
 
 def audited(stated: Stated, truth: Stated, options: Options) -> Audited:
     """Return a trajectory's errors against the truth, or a reference; raises UsageError where nothing can be said."""
-    frame = stated.frame or options.error or DEFAULT
+    frame = options.error or stated.frame or DEFAULT
     checked, at = check(stated), paired(stated, truth, options.nearest_s)
     rows = np.flatnonzero(checked.usable & at.known)
     covs, by = stated.used_covs, geometry_of(stated.poses_world)
@@ -146,7 +148,8 @@ def audited(stated: Stated, truth: Stated, options: Options) -> Audited:
             f"expected at least {LEAST} poses of {stated.name} with a covariance and a time in {truth.name}, found"
             f" {len(rows)}: give more of the drive"
         )
-    poses, true, covs = stated.poses_world[rows], at.poses_world[rows], covs[rows]
+    poses, true = stated.poses_world[rows], at.poses_world[rows]
+    covs = by.to_frame(poses, covs[rows], stated.frame or frame, frame)
     align: Align = options.align if stated.held is None else "start"
     if align != "none":
         start = int(np.argmax(at.known)) if stated.held is None else stated.held
@@ -163,11 +166,13 @@ def audited(stated: Stated, truth: Stated, options: Options) -> Audited:
         poses, covs = by.moved(poses, motion), by.moved_covs(covs, motion, frame)
     if options.reference_sigma is not None:
         covs = covs + _of_reference(poses, options.reference_sigma, frame, covs.shape[1])
-    left = by.errors(poses, true, frame)
+    if not np.any(np.abs(left := by.errors(poses, true, frame)) > EXACT):
+        raise UsageError(f"expected {truth.name} to differ from {stated.name}, found the same poses: name the truth")
     plain = stated.used_covs if frame == DEFAULT and align == "none" else None
+    scores = _scores(left, covs, by.to_frame(poses, covs, frame, "body"), stated.cross_at(rows))
     order = "" if plain is None else order_hint(stated, _spread(left, rows, len(stated.time_s)))
     return Audited(
-        stated.name, frame, stated.time_s[rows], left, covs, *_scores(left, covs),
+        stated.name, frame, stated.time_s[rows], left, covs, *scores,
         stated.anees_from_start or _from_start(poses, true, covs, frame), _lags(stated, rows, poses, true, frame),
         tuple(filter(None, (*stated.notes, at.note, *checked.notes, _aligned(align)))),
         (order,) if order else tuple(hints(left, covs)),
@@ -194,31 +199,46 @@ def audited_relations(stated: Stated, relations: Relations, options: Options) ->
         )
     chosen = chosen[np.argsort(relations.first_s[chosen], kind="stable")]
     taken, poses = relations.take(chosen), stated.poses_world
-    stated_covs, is_bound = _between_covs(stated, first[chosen], second[chosen], frame)
-    own = sigmas_of_relations(relations)
-    total = stated_covs if own is None else stated_covs + own.cov
-    left = between(taken.motions, between(poses[first[chosen]], poses[second[chosen]]))
+    between = relative(stated, first[chosen], second[chosen], frame)
+    by, own = geometry_of(poses), misclosures(relations).sigmas
+    total = between.covs if own is None else between.covs + own.cov_of(between.covs.shape[1])
+    left = by.coordinates(by.between(taken.motions, by.between(poses[first[chosen]], poses[second[chosen]])))
     notes = ["the relations count as exact, since no three of them close a triangle"] if own is None else [
         f"sigma of a relation, from triangles of them: {own.translation_m:.3g} m and {own.rotation_rad:.3g} rad,"
         f" within which {own.mistaken} of {own.mistaken + own.told_by} do not close (99 % region)"
     ]  # fmt: skip
-    if is_bound:
+    if between.is_bound:
         notes.append("the correlation of two poses is not stated, so relations between them have the largest possible"
                      " covariance, and only overconfidence can be told")  # fmt: skip
     return Audited(
-        stated.name, frame, taken.first_s, left, total, *_scores(left, total), None, (),
-        (*stated.notes, *checked.notes, *notes), (), "relations", is_bound,
+        stated.name, frame, taken.first_s, left, total, *_scores(left, total, total, between.cross), None, (),
+        (*stated.notes, *checked.notes, *notes), (), "relations", between.is_bound,
     )  # fmt: skip
 
 
-def _scores(left: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> tuple[Score, Score, Score]:
+def _dof(covs: Float[np.ndarray, "n d d"], cross: Cross | None, part: slice = slice(None)) -> float | None:
+    """Return the degrees of freedom of the mean NEES along some axes of the body, if it is known how errors depend."""
+    if cross is None:
+        return None
+    whiten = np.linalg.inv(np.linalg.cholesky(covs[:, part, part]))
+    return joint_dof(whiten, lambda some: cross(some)[:, part, :, part])
+
+
+def _scores(
+    left: Float[np.ndarray, "n d"],
+    covs: Float[np.ndarray, "n d d"],
+    body: Float[np.ndarray, "n d d"],
+    cross: Cross | None,
+) -> tuple[Score, Score, Score]:
+    """Return the scores of pose, position and rotation; `body` and `cross` are covariances in the body frames."""
     if not np.all(rest := definite(covs)):
         raise UsageError(
             f"expected covariances that are positive definite beside those of the errors' frame, found"
             f" {np.count_nonzero(~rest)} that are not: give more digits, or move the origin nearer"
         )
     pose, position, heading = (
-        score(whitened(left[:, at], covs[:, at, at])) for at in (slice(None), *parts(left.shape[1]))
+        score(whitened(left[:, at], covs[:, at, at]), _dof(body, cross, at))
+        for at in (slice(None), *parts(left.shape[1]))
     )
     return pose, position, heading
 
@@ -270,26 +290,11 @@ def _lags(
     for steps in LAGS:
         if len(rows) <= max(steps, LEAST):
             break
-        left = by.relative_errors(*(by.between(path[:-steps], path[steps:]) for path in (true, poses)))
+        left = by.coordinates(by.between(*(by.between(path[:-steps], path[steps:]) for path in (true, poses))))
         position, rotation = parts(left.shape[1])
-        total, is_bound = _between_covs(stated, rows[:-steps], rows[steps:], frame)
-        if not np.all(definite(total)):
+        between = relative(stated, rows[:-steps], rows[steps:], frame)
+        if not np.all(definite(between.covs)):
             continue
-        told = score(whitened(left, total))
-        found.append(Lag(steps, _size(left[:, position]), _size(left[:, rotation]), told, is_bound))
+        told = score(whitened(left, between.covs), _dof(between.covs, between.cross))
+        found.append(Lag(steps, _size(left[:, position]), _size(left[:, rotation]), told, between.is_bound))
     return tuple(found)
-
-
-def _between_covs(
-    stated: Stated, first: Int[np.ndarray, " m"], second: Int[np.ndarray, " m"], frame: Frame
-) -> tuple[Float[np.ndarray, "m d d"], bool]:
-    """Return the covariances of relations between poses in the frame of the second, and whether they are bounds."""
-    by, own = geometry_of(stated.poses_world), stated.used_covs
-    motions = by.between(stated.poses_world[first], stated.poses_world[second])
-    if stated.pair_covs is not None:
-        return by.relation_covs(motions, stated.pair_covs(first, second)), False
-    assert own is not None
-    body = [by.to_frame(stated.poses_world[rows], own[rows], frame, "body") for rows in (first, second)]
-    joint, axes = np.zeros((len(first), 2 * own.shape[1], 2 * own.shape[1])), own.shape[1]
-    joint[:, :axes, :axes], joint[:, axes:, axes:] = body
-    return 2.0 * by.relation_covs(motions, joint), True

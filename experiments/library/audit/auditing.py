@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,12 +17,14 @@ from ...artifacts.run_folder import prepare
 from ...scoring.without_truth.references import read_relations
 from ...usage import UsageError
 from .audited import Align, Audited, Options, audited, audited_relations
+from .geometry.plane import Frame
 from .reading.bags import read_poses
-from .reading.graphs import is_graph, read_graph
-from .reading.stated import TRUTH, Frame, Space, Stated, in_space, read_folder, read_text
+from .reading.graphs import Rotations, is_graph, read_graph
+from .reading.stated import TRUTH, Space, Stated, in_space, read_folder, read_text
 from .verdicts import Pair, Pooled, compare, pool
 from .without.halves import halves_of
 from .without.inner import Inner
+from .without.inner import pool as pool_inner
 from .without.innovations import innovations
 from .without.loops import loops
 from .without.triangles import closures
@@ -39,7 +41,7 @@ class Audit:
 
     trajectories: tuple[Audited, ...]
     pooled: Pooled | None
-    """Over several runs of one estimator, each with a truth of its own."""
+    """Over several runs of one estimator, each with a truth of its own, or all without one."""
     pairs: tuple[Pair, ...]
     """Of several estimators on one drive."""
     asked: tuple[str, ...]
@@ -56,18 +58,16 @@ class Audit:
         return [*each, *inner, *self._pooled(), *(pair.told() for pair in self.pairs)]
 
     def _pooled(self) -> list[str]:
-        return [] if self.pooled is None else [pooled_line(self.pooled)]
+        if self.pooled is not None:
+            return [pooled_line(self.pooled)]
+        kinds = list(dict.fromkeys(each.kind for each in self.without_truth))
+        return [f"not pooled, since they are of different kinds: {', '.join(kinds)}"] if len(kinds) > 1 else []
 
     def record(self) -> dict[str, Any]:
         """Return all figures, by name."""
-        pooled = self.pooled
         return {
             "trajectories": [each.record() for each in self.trajectories],
-            "pooled": pooled and {
-                "runs": pooled.runs, "verdict": pooled.verdict.words, "factor": pooled.verdict.factor,
-                "factor_interval": pooled.verdict.factor_interval, "anees": pooled.anees,
-                "anees_interval": [pooled.low, pooled.high],
-            },
+            "pooled": self.pooled and self.pooled.record(),
             "pairs": [
                 {"first": pair.first, "second": pair.second, "nees_ratio": pair.ratio,
                  "nees_ratio_interval": pair.interval, "stretches": pair.blocks} for pair in self.pairs
@@ -109,6 +109,7 @@ def audit(
     without_truth: bool = False,
     halves: bool = False,
     space: Space = "plane",
+    g2o_rotation: Rotations | None = None,
     error: Frame | None = None,
     align: Align = "none",
     reference_sigma: tuple[float, float] | None = None,
@@ -118,21 +119,24 @@ def audit(
 ) -> Audit:
     """Tell whether the covariances of trajectories may be believed, as `chainslam audit` does.
 
-    `trajectories` are files or folders of runs. `truth`, or a `reference` with standard deviations `reference_sigma`
-    (m, rad), is one file for each, which are then runs of one estimator, or one for all, which are then different
-    estimators. `relations` is a file of measured relations between poses; without a trajectory its triangles are
-    audited. Without a truth, the innovations of a run's folder and the loop closures of a graph are audited;
-    `without_truth` asks for that although there is a truth. `halves` compares two trajectories with each other, of
-    two halves of the data. `space` "space" audits all six axes of poses with position and quaternion, in place of x,
-    y and heading. `error` is the frame that the covariances are stated in: "additive" (the default), "body" or
-    "world". `nearest` takes the nearest true pose within so many seconds, which is otherwise interpolated. Raises
-    UsageError for bad input.
+    `trajectories` are files or folders of runs. `truth`, or a `reference` with standard deviations
+    `reference_sigma` (m, rad), is one file for each, which are then runs of one estimator, or one for all, which
+    are then different estimators. `relations` is a file of measured relations between poses; without a trajectory
+    its triangles are audited. Without a truth, the innovations of a run's folder and the loop closures of a graph
+    are audited, and pooled if there are several of one back end, or several graphs; `without_truth` asks for that
+    although there is a truth. `halves` compares two trajectories with each other, of two halves of the data.
+    `space` "space" audits all six axes of poses with position and quaternion, in place of x, y and heading.
+    `g2o_rotation` tells whether the rotational information of a graph in space is that of rotation vectors
+    ("vector", the default) or of the x, y and z of quaternions ("quaternion"). `error` is the frame that the
+    covariances are stated in: "additive" (the default), "body" or "world"; those of a graph, which are of the body
+    frame, are converted. `nearest` takes the nearest true pose within so many seconds, which is otherwise
+    interpolated. Raises UsageError for bad input.
     """
     paths, true, references = _paths(trajectories), _paths(truth), _paths(reference)
     given: dict[str, Any] = {
         "truth": true, "reference": references, "relations": [] if relations is None else [relations],
         "without-truth": [] if not without_truth else [""], "halves": [] if not halves else [""],
-        "space": [] if space == "plane" else [space],
+        "space": [] if space == "plane" else [space], "g2o-rotation": [] if g2o_rotation is None else [g2o_rotation],
         "error": [] if error is None else [error], "align": [] if align == "none" else [align],
         "reference-sigma": reference_sigma or [], "nearest": [] if nearest is None else [nearest],
         "topic": [] if topic is None else [topic], "truth-topic": [] if truth_topic is None else [truth_topic],
@@ -143,14 +147,16 @@ def audit(
     options = Options(error, align, reference_sigma, nearest)
     if not paths:
         assert relations is not None
-        return Audit((), None, (), tuple(asked), (closures(Path(relations), reference_sigma),))
-    if without_truth or not (true or references or relations or halves or not all(map(_is_alone, paths))):
-        return Audit((), None, (), tuple(asked), tuple(map(_inner, paths)))
-    stated = _named([read(path, topic, space=space) for path in paths])
+        return Audit((), None, (), tuple(asked), (closures(Path(relations), reference_sigma, space),))
+    if _judged_alone(paths, given):
+        inner = tuple(_named([_inner(each, space, g2o_rotation) for each in paths]))
+        are_runs = len(inner) > 1 and len({each.kind for each in inner}) == 1
+        return Audit((), pool_inner(inner) if are_runs else None, (), tuple(asked), inner)
+    stated = _named([read(path, topic, True, space, g2o_rotation) for path in paths])
     if halves:
         return Audit((halves_of(stated, options),), None, (), tuple(asked))
     if relations is not None:
-        measured = read_relations(Path(relations))
+        measured = read_relations(Path(relations), space == "space")
         found = tuple(audited_relations(each, measured, options) for each in stated)
         return Audit(found, None, _pairs(found, stated[:1] * len(found)), tuple(asked))
     known = true or references or _own(stated)
@@ -158,7 +164,7 @@ def audit(
         raise UsageError(
             f"expected one truth for all or one for each of {len(paths)} trajectories, found {len(known)}: correct it"
         )
-    truths = [read(path, truth_topic, False, space) for path in known]
+    truths = [read(path, truth_topic, False, space, g2o_rotation) for path in known]
     every = truths if len(truths) == len(stated) else truths * len(stated)
     found = tuple(audited(each, against, options) for each, against in zip(stated, every, strict=True))
     estimators = {each.estimator for each in stated} - {None}
@@ -167,24 +173,36 @@ def audit(
     return Audit(found, None, _pairs(found, every), tuple(asked))
 
 
+def _judged_alone(paths: Sequence[Path], given: dict[str, Any]) -> bool:
+    """Return whether trajectories are judged by what they hold themselves."""
+    is_compared = any(given[name] for name in ("truth", "reference", "relations", "halves"))
+    return bool(given["without-truth"]) or not (is_compared or not all(map(_is_alone, paths)))
+
+
 def _is_alone(path: Path) -> bool:
     """Return whether a graph or the folder of a run has no truth of its own."""
     has_steps = path.is_dir() and (path / "steps.csv").is_file()
     return is_graph(path) or (has_steps and not (path / TRUTH).is_file())
 
 
-def _inner(path: Path) -> Inner:
+def _inner(path: Path, space: Space, rotation: Rotations | None) -> Inner:
     if is_graph(path):
-        return loops(path)
+        return loops(path, space, rotation)
     if not (path / "steps.csv").is_file():
         raise UsageError(f"expected the folder of a run or a g2o graph for --without-truth, found {path}: {GIVE}")
     return innovations(path)
 
 
-def read(path: Path, topic: str | None = None, needs_covariance: bool = True, space: Space = "plane") -> Stated:
+def read(
+    path: Path,
+    topic: str | None = None,
+    needs_covariance: bool = True,
+    space: Space = "plane",
+    rotation: Rotations | None = None,
+) -> Stated:
     """Read a trajectory of whatever format; raises UsageError."""
     if is_graph(path):
-        found = read_graph(path)
+        found = read_graph(path, space, rotation)
     elif is_bag(path):
         found = read_poses(path, topic, needs_covariance)
     else:
@@ -199,11 +217,23 @@ def _paths(given: Paths) -> list[Path]:
 def _check(paths: Sequence[Path], given: dict[str, Any]) -> None:
     if not paths and not given["relations"]:
         raise UsageError("expected a trajectory with covariances, found none: name a file or the folder of a run first")
+    places = [path.resolve() for path in paths]
+    if doubles := [path for path, place in zip(paths, places, strict=True) if places.count(place) > 1]:
+        raise UsageError(f"expected different trajectories, found {doubles[0]} {len(doubles)} times: name it once")
     against = [f"--{name}" for name in ("truth", "reference", "relations", "without-truth", "halves") if given[name]]
     if len(against) > 1:
         raise UsageError(f"expected one of {', '.join(against)}, found {len(against)}: leave the others out")
-    if given["space"] and given["relations"]:
-        raise UsageError("expected --relations without --space, found both: relations are audited in the plane")
+    if given["g2o-rotation"] and not (given["space"] and any(map(is_graph, paths))):
+        raise UsageError("expected --g2o-rotation beside --space space and a g2o graph, found it alone: leave it out")
+    for option, files in (("topic", paths), ("truth-topic", given["truth"] + given["reference"])):
+        if given[option] and not any(map(is_bag, files)):
+            raise UsageError(f"expected --{option} beside a ROS bag, found none: leave it out")
+    by_truth = given["truth"] or given["reference"] or given["halves"]
+    for option in ("align", "nearest"):
+        if given[option] and not by_truth and (given["relations"] or _judged_alone(paths, given)):
+            raise UsageError(f"expected --{option} beside --truth or --reference, found none: leave it out")
+    if given["error"] and (not paths or _judged_alone(paths, given)):
+        raise UsageError("expected --error beside poses to compare, found none: leave it out")
     sigma = given["reference-sigma"]
     known = given["reference"] or not paths
     if sigma and (not known or not np.all(np.isfinite(sigma)) or min(sigma) < 0.0):
@@ -221,7 +251,10 @@ def _own(stated: Sequence[Stated]) -> list[Path]:
     return [each.truth for each in stated if each.truth is not None]
 
 
-def _named(stated: Sequence[Stated]) -> list[Stated]:
+Named = TypeVar("Named", Stated, Inner)
+
+
+def _named(stated: Sequence[Named]) -> list[Named]:
     """Return trajectories with different names."""
     names = [each.name for each in stated]
     return [

@@ -6,9 +6,12 @@ lasts as long as the series counts as one draw. The NEES of Gaussian errors of c
 1/n_i = (1 + 2 sum_k (1 - k/n) rho_i(k)^2) / n for axis i, summed to the first lag at which rho_i is not positive. The
 degrees of freedom of the mean are nu = d^2 / sum_i 1/n_i (Satterthwaite), from d for one draw to n d, and the interval
 of the ANEES is that of a variance by chi-square: nu ANEES over its quantiles.
+
+A graph states how its errors depend on each other, so that nothing is estimated from the series: with the correlations
+K_ij of whitened errors, nu = (n d)^2 / sum_ij |K_ij|^2.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +23,12 @@ from chainslam.slam.estimation.gates import gate_level
 LEVELS = (0.5, 0.9, 0.95, 0.99)
 """Of the regions whose coverage is told."""
 LEVEL = 0.95
+AT_ONCE = 100
+"""Errors whose correlations with all others are computed together."""
+MOST = 500
+"""Errors whose correlations with all others are computed; of more, an even choice."""
+Cross = Callable[[Int[np.ndarray, " k"]], Float[np.ndarray, "n d k d"]]
+"""The covariances of all errors with some, given their rows."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +50,14 @@ class Score:
     """Share of errors inside the regions of 50, 90, 95 and 99 %."""
 
 
-def score(white: Float[np.ndarray, "n d"]) -> Score:
-    """Return the score of a series of whitened errors in the order of their times; n is at least 1."""
+def score(white: Float[np.ndarray, "n d"], dof: float | None = None) -> Score:
+    """Return the score of a series of whitened errors in the order of their times; n is at least 1.
+
+    The degrees of freedom of their mean are estimated from the series if they are not known.
+    """
     count, d = white.shape
     nees = np.sum(white**2, axis=1)
-    dof = effective_dof(white)
+    dof = effective_dof(white) if dof is None else dof
     low, high = interval(float(nees.mean()) / d, dof)
     inside = tuple(float(np.mean(nees <= gate_level(level, d))) for level in LEVELS)
     median = float(np.median(nees)) / gate_level(0.5, d)
@@ -65,9 +77,20 @@ def effective_dof(white: Float[np.ndarray, "n d"]) -> float:
     return d * d / sum(_share_of_one_draw(white[:, axis]) for axis in range(d))
 
 
-def pooled_dof(scores: Sequence[Score]) -> float:
+def joint_dof(whiten: Float[np.ndarray, "n d d"], cross: Cross) -> float:
+    """Return the degrees of freedom of the mean NEES of errors whose covariances with each other are known."""
+    (n, d, _), total = whiten.shape, 0.0
+    chosen = evenly(n, MOST)
+    for part in np.array_split(chosen, -(-len(chosen) // AT_ONCE)):
+        K = np.einsum("iab,ibjc,jdc->iajd", whiten, cross(part), whiten[part], optimize=True)
+        K[part, :, np.arange(len(part))] = np.eye(d)
+        total += float(np.sum(K**2)) * n / len(chosen)
+    return float(n * d) ** 2 / total
+
+
+def pooled_dof(dofs: Sequence[float]) -> float:
     """Return the degrees of freedom of the mean of the ANEES of independent runs."""
-    return len(scores) ** 2 / sum(1.0 / each.dof for each in scores)
+    return len(dofs) ** 2 / sum(1.0 / each for each in dofs)
 
 
 def _share_of_one_draw(w: Float[np.ndarray, " n"]) -> float:

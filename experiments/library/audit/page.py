@@ -73,10 +73,7 @@ def _mean(of: dict[str, Any]) -> str:
 def _table(found: Sequence[Audited], pooled: Pooled | None) -> PageTable:
     rows, turn = [each.record() for each in found], found[0].turn
     if pooled is not None:
-        rows.append({
-            "file": f"{pooled.runs} runs together", "verdict": pooled.verdict.words, "factor": pooled.verdict.factor,
-            "anees": pooled.anees, "anees_interval": [pooled.low, pooled.high],
-        })  # fmt: skip
+        rows.append({"file": f"{pooled.runs} runs together", **pooled.record()})
     return table(
         "Errors and covariances",
         {

@@ -50,7 +50,7 @@ def check(stated: Stated) -> Checked:
     if covs is None:
         raise UsageError(
             f"expected {stated.name} with covariances, found poses only: append 6 columns xx xy xt yy yt tt of x, y and"
-            " heading, or the 21 of ROS"
+            " heading, which a header calls so, or the 21 of ROS"
         )
     finite = np.all(np.abs(covs) <= LARGEST, axis=(1, 2))  # NaN is not
     zero = finite & np.all(covs == 0.0, axis=(1, 2)) & (np.arange(len(covs)) != stated.held)

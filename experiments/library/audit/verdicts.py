@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -55,29 +56,42 @@ def judge(anees: float, low: float, high: float, dof: float = float("inf"), is_b
 
 @dataclass(frozen=True)
 class Pooled:
-    """The mean ANEES of several runs of one estimator."""
+    """The mean ANEES of several runs of one estimator, or of what stands for it without a truth."""
 
     runs: int
-    anees: float
+    mean: float
     low: float
     high: float
     verdict: Verdict
+    statistic: str = "ANEES"
+
+    def record(self) -> dict[str, Any]:
+        """Return all figures, by name."""
+        name = "anees" if self.statistic == "ANEES" else "mean"
+        return {
+            "runs": self.runs, "verdict": self.verdict.words, "factor": self.verdict.factor,
+            "factor_interval": self.verdict.factor_interval, "statistic": self.statistic, name: self.mean,
+            f"{name}_interval": [self.low, self.high],
+        }  # fmt: skip
 
 
 def pool(scores: Sequence[Score]) -> Pooled:
-    """Return the mean ANEES of independent runs and its verdict.
+    """Return the mean ANEES of independent runs and its verdict."""
+    mean, low, high, dof = mean_of_runs([each.anees for each in scores], [each.dof for each in scores])
+    return Pooled(len(scores), mean, low, high, judge(mean, low, high, dof))
+
+
+def mean_of_runs(values: Sequence[float], dofs: Sequence[float]) -> tuple[float, float, float, float]:
+    """Return the mean over independent runs of means with so many degrees of freedom, its 95 % interval, and theirs.
 
     From ten runs on the interval is the studentised one over runs; of fewer, by chi-square with the degrees of freedom
     of all runs together.
     """
-    values = [each.anees for each in scores]
-    mean, dof = float(np.mean(values)), pooled_dof(scores)
+    mean, dof = float(np.mean(values)), pooled_dof(dofs)
     found = mean_interval(np.array(values)) if len(values) >= FEW_RUNS else None
     if found is None:
-        low, high = interval(mean, dof)
-    else:
-        low, high, dof = max(found[0], 0.0), found[1], float("inf")
-    return Pooled(len(scores), mean, low, high, judge(mean, low, high, dof))
+        return mean, *interval(mean, dof), dof
+    return mean, max(found[0], 0.0), found[1], float("inf")
 
 
 @dataclass(frozen=True)

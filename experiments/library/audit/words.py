@@ -39,6 +39,6 @@ def _sizes(record: dict[str, Any], keys: str) -> str:
 
 def pooled_line(found: Pooled) -> str:
     """Return the verdict over several runs of one estimator."""
-    many = f"mean ANEES {number(found.anees)}, 95 % interval {number(found.low)} to {number(found.high)}"
+    many = f"mean {found.statistic} {number(found.mean)}, 95 % interval {number(found.low)} to {number(found.high)}"
     many = f" ({many})" if found.verdict.words == TOO_FEW else f"; {many}"
     return f"{found.runs} runs together: {found.verdict.told()}{many}"

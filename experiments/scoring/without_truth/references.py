@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from chainslam.sim.logs.archive import regular
 from chainslam.sim.logs.recorded_robot import MOST_M
@@ -21,6 +22,8 @@ from .relations import (
 )
 
 MOST_BYTES = 2**28
+BYTE_ORDER_MARK = "\xef\xbb\xbf"
+"""What spreadsheets write before a table, as Latin-1 has it."""
 RELATION, TUM, PLANAR = 8, 8, 4
 """Numbers on a line of a relations file, of a path in the TUM format, and of a path as `t x y theta`."""
 LEAST = 3
@@ -43,10 +46,18 @@ def read_references(relations: Path | None, path: Path | None) -> References:
     )
 
 
-def read_relations(path: Path) -> Relations:
-    """Read lines `t1 t2 x y z roll pitch yaw` as the Freiburg benchmark has them; raises UsageError."""
+def read_relations(path: Path, in_space: bool = False) -> Relations:
+    """Read lines `t1 t2 x y z roll pitch yaw` as the Freiburg benchmark has them; raises UsageError.
+
+    In space the rotation is the roll about x, then the pitch about y and the yaw about z, about fixed axes as in ROS.
+    """
     rows = _table(path, (RELATION,), "relations (t1 t2 x y z roll pitch yaw)")
-    motions = np.column_stack([rows[:, 2:4], wrap(rows[:, 7])])
+    if (most := np.abs(rows[:, 5:]).max()) > 2.0 * np.pi:
+        raise UsageError(f"expected roll, pitch and yaw in radians in {path.name}, found {most:.4g}: degrees?")
+    if in_space:
+        motions = np.column_stack([rows[:, 2:5], Rotation.from_euler("xyz", rows[:, 5:8]).as_quat()])
+    else:
+        motions = np.column_stack([rows[:, 2:4], wrap(rows[:, 7])])
     return Relations(rows[:, 0], rows[:, 1], motions)
 
 
@@ -63,7 +74,7 @@ def lines_of(path: Path, what: str) -> list[str]:
     try:
         if regular(path).stat().st_size > MOST_BYTES:
             raise UsageError(f"expected {what}, found {path.name} of more than {MOST_BYTES >> 20} MiB: name another")
-        return path.read_text(encoding="latin-1").splitlines()
+        return path.read_text(encoding="latin-1").removeprefix(BYTE_ORDER_MARK).splitlines()
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise UsageError(f"expected {what}, found {path.name} ({reason}): name a file that exists") from error

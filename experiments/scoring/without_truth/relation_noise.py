@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.optimize import minimize
 
-from chainslam.slam.estimation.gates import gate_level
+from chainslam.slam.estimation.gates import gate_level, mean_inside
 from chainslam.slam.evaluation.consistency import nees
 from chainslam.slam.geometry.poses import J, turned
 
@@ -20,6 +20,8 @@ from .relations import Relations, between
 
 LEAST = 1e-4
 """Lower limit of the error of measurements, m and rad."""
+GATE = 0.99
+"""Level beyond which a residual counts as a mistake."""
 ROUNDS = 10
 """Upper limit of the iterations for the most likely error."""
 
@@ -37,8 +39,36 @@ class Sigmas:
 
     @property
     def cov(self) -> Float[np.ndarray, "3 3"]:
-        """Its covariance."""
-        return np.diag(np.square([self.translation_m, self.translation_m, self.rotation_rad]))
+        """Its covariance in the plane."""
+        return self.cov_of(3)
+
+    def cov_of(self, axes: int) -> Float[np.ndarray, "d d"]:
+        """Return its covariance along 3 axes in the plane, or 6 in space."""
+        turns = 1 if axes == 3 else 3
+        return np.diag(np.square(np.repeat([self.translation_m, self.rotation_rad], [axes - turns, turns])))
+
+
+@dataclass(frozen=True)
+class Misclosures:
+    """How t triangles of relations close, along 3 axes in the plane or 6 in space: a to b and on to c against a to c.
+
+    Each of the three relations of a triangle is estimated from the other two; the misclosure is the error of all three.
+    """
+
+    rows: Int[np.ndarray, "t 3"]
+    """Of the relations a to b, b to c and a to c."""
+    left: Float[np.ndarray, "t d"]
+    back: Float[np.ndarray, "t d d"]
+    """What makes an error of the first relation into one at the end of the second."""
+
+    def covs(self, own: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "t d d"]:
+        """Return the covariances of the misclosures where each relation has this one."""
+        return np.asarray(2.0 * own + self.back @ own @ self.back.swapaxes(1, 2))
+
+    @property
+    def sigmas(self) -> Sigmas | None:
+        """The most likely error of a single relation; None if no triangle determines it."""
+        return likeliest(self.left, self.covs) if len(self.rows) else None
 
 
 def adjoint_of_inverse(motions: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "m 3 3"]:
@@ -84,20 +114,10 @@ def triangles(relations: Relations) -> Int[np.ndarray, "t 3"]:
 
 
 def sigmas_of_relations(relations: Relations) -> Sigmas | None:
-    """Return the error of a single relation; None if no triangle determines it.
-
-    Each of the three relations of a triangle is estimated from the other two; the misclosure is the error of all three.
-    """
+    """Return the error of a single relation in the plane; None if no triangle determines it."""
     rows = triangles(relations)
-    if not len(rows):
-        return None
     ab, bc, ac = (relations.motions[column] for column in rows.T)
-    back = adjoint_of_inverse(bc)
-
-    def noise(S: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "t 3 3"]:
-        return np.asarray(2.0 * S + back @ S @ back.swapaxes(1, 2))
-
-    return likeliest(between(ac, composed(ab, bc)), noise)
+    return Misclosures(rows, between(ac, composed(ab, bc)), adjoint_of_inverse(bc)).sigmas
 
 
 def sigmas_of_path(
@@ -110,26 +130,29 @@ def sigmas_of_path(
     return likeliest(left, lambda S: own + pose_noise(S, motions))
 
 
-def likeliest(left: Float[np.ndarray, "m 3"], noise: Callable[[np.ndarray], np.ndarray]) -> Sigmas:
+def likeliest(left: Float[np.ndarray, "m d"], noise: Callable[[np.ndarray], np.ndarray]) -> Sigmas:
     """Return the most likely error, where `noise` is the covariance of the residuals as a function of it.
 
     Some residuals are gross errors, which are not Gaussian: those beyond the level of 99 % are left out, and the most
-    likely error is computed again until it no longer changes.
+    likely error is computed again until it no longer changes. What is left scatters less than all that is Gaussian, by
+    a factor that is known and taken out.
     """
     kept = np.ones(len(left), dtype=bool)
     for _ in range(ROUNDS):
         found = _likeliest(left, noise, kept)
-        before, kept = kept, nees(left, noise(found.cov)) <= gate_level(0.99, 3)
+        before, kept = kept, nees(left, noise(found.cov_of(left.shape[1]))) <= gate_level(GATE, left.shape[1])
         if not np.any(kept) or np.array_equal(before, kept):
             break
     return replace(found, told_by=int(np.count_nonzero(before)), mistaken=int(np.count_nonzero(~before)))
 
 
 def _likeliest(
-    left: Float[np.ndarray, "m 3"], noise: Callable[[np.ndarray], np.ndarray], kept: Bool[np.ndarray, " m"]
+    left: Float[np.ndarray, "m d"], noise: Callable[[np.ndarray], np.ndarray], kept: Bool[np.ndarray, " m"]
 ) -> Sigmas:
+    inside = mean_inside(GATE, left.shape[1])
+
     def cost(logs: Float[np.ndarray, "2"]) -> float:
-        covs = noise(_sigmas(logs).cov)[kept]
+        covs = inside * noise(_sigmas(logs).cov_of(left.shape[1]))[kept]
         return float(np.sum(np.linalg.slogdet(covs)[1]) + np.sum(nees(left[kept], covs)))
 
     return _sigmas(minimize(cost, np.log([0.02, 0.01]), method="Nelder-Mead", options={"xatol": 1e-4}).x)

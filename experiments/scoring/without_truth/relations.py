@@ -22,8 +22,8 @@ class Relations:
 
     first_s: Float[np.ndarray, " m"]
     second_s: Float[np.ndarray, " m"]
-    motions: Float[np.ndarray, "m 3"]
-    """The second pose in the frame of the first, m m rad."""
+    motions: Float[np.ndarray, "m p"]
+    """The second pose in the frame of the first, m m rad; in space x y z qx qy qz qw."""
 
     def take(self, rows: Bool[np.ndarray, " m"] | Int[np.ndarray, " k"]) -> "Relations":
         """Return the chosen ones."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ...geometry.quantities import Angle, Count, Distance, Factor, Number, Probability, Sigmas, Weight
+from ...geometry.quantities import Angle, Distance, Factor, Number, Probability, Weight
 
 
 @dataclass(frozen=True)
@@ -26,16 +26,7 @@ class GraphConfig:
     careful: bool = False
     """Eliminate by QR instead of Cholesky: a fifth slower, but accurate if some directions are known 10,000 times
     better than others."""
-    loose: Sigmas = 0.1
-    """An observation is relinearised once the turn of its wall makes the distance wrong by this many standard
-    deviations."""
-    loose_sigmas: Sigmas = 3.0
-    """Number of standard deviations by which a wall's direction may change; observations that stay accurate then are
-    not checked again."""
     most_turn_rad: Angle = 1.2
-    """Largest angle between an observation and its prediction in linearisation; a solution in which a wall turns
-    further is rejected."""
+    """A solution in which a wall turns by more than this from where it is linearised is rejected."""
     diverged_chance: Probability = 1e-9
     """A solution whose pose is less likely than this, given its prediction, is repeated with damped steps."""
-    rounds: Count = 10
-    """Largest number of relinearisations of the batch solution."""

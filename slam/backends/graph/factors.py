@@ -5,15 +5,24 @@ the turn by heading about X at (0, x, y), a line (alpha, r) as the plane (0, cos
 the motion plane (three directions of a pose, the tilt of a plane) meets no measurement of the rest and stays at zero.
 In this embedding the charts are the same for every alpha: a plane's is (-d alpha, tilt, -d r), a pose's is
 (d heading, -, -, -, d x, d y) in the body frame.
+
+The plane factor's error is (-sin(epsilon), tilt, r - r_predicted), epsilon the angle by which the observation departs
+from the line. The model (`chainslam.slam.estimation.models.innovations`) has (epsilon, r cos(epsilon) - t0
+sin(epsilon) - r_predicted), t0 the place of the observed piece along its line. As r cos(epsilon) - t0 sin(epsilon) is
+rho sin(epsilon + phi), a plane factor that observes the line turned by phi through the robot holds the second part
+exactly, and another one the first.
 """
 
-from math import atan2, cos, sin, sqrt, tan
+from collections.abc import Iterator
+from math import atan2, cos, hypot, sin, sqrt
 
 import gtsam
 import numpy as np
 from jaxtyping import Float
 
-from .kernels import odometry_noise
+from ...geometry.poses import rotation
+from ...robot import Odometry
+from .record import Observation
 
 POSE_ROWS = (4, 5, 0)
 """Where x, y and heading stand in the chart of a pose, which has 6 rows."""
@@ -69,41 +78,28 @@ def origin_factor() -> gtsam.PriorFactorPose3:
     return gtsam.PriorFactorPose3(pose_key(0), gtsam.Pose3(), _noise(np.zeros((3, 3))))
 
 
-def odometry_factor(
-    index: int, motion: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"]
-) -> gtsam.BetweenFactorPose3:
-    """Say how the robot moved to pose `index`; GTSAM takes the error in the frame after the motion, `cov` before it."""
-    noise = _noise(odometry_noise(motion, cov))
-    return gtsam.BetweenFactorPose3(pose_key(index - 1), pose_key(index), pose3(motion), noise)
+def odometry_factor(index: int, odometry: Odometry) -> gtsam.BetweenFactorPose3:
+    """Say how the robot moved to pose `index`; GTSAM takes the error in the frame after the motion, not before it."""
+    turn = np.eye(3)
+    turn[:2, :2] = rotation(-odometry.motion[2])
+    noise = _noise(turn @ odometry.cov @ turn.T)
+    return gtsam.BetweenFactorPose3(pose_key(index - 1), pose_key(index), pose3(odometry.motion), noise)
 
 
-def line_factor(
-    index: int, line: int, seen: tuple[float, float, float, float, float], epsilon: float
-) -> gtsam.OrientedPlane3Factor:
-    """Say where a line was seen from pose `index`: the model of `chainslam.slam.estimation.models.innovations`.
-
-    `seen` is (alpha, r, C_alpha_alpha, C_alpha_r, C_r_r) in the robot frame, `epsilon` the angle by which it departs
-    from the prediction now. The plane factor's error is (sin(epsilon), r - r_predicted) where the model has
-    (epsilon, r cos(epsilon) - t0 sin(epsilon) - r_predicted). The latter's tangent at the present epsilon is the
-    former's with r / cos(epsilon) in place of r and t0 + r tan(epsilon) in place of t0.
-    """
-    alpha, r, along, cross, across = seen
+def line_factors(line: int, observation: Observation) -> Iterator[gtsam.OrientedPlane3Factor]:
+    """Say in which direction, and at which distance, a line was seen."""
+    alpha, r, along, cross, across = observation.seen
     t0 = cross / along
-    scale = cos(epsilon) - t0 * sin(epsilon) / r
-    b = (across - cross * t0) * scale * scale
-    t = t0 + r * tan(epsilon)
-    # Upper triangular W with W'W the inverse of [[a, -t a], [-t a, b + t t a]], a = C_alpha_alpha.
-    W = np.zeros((3, 3))
-    W[0, 0] = sqrt(1.0 / along + t * t / b)
-    W[0, 2] = t / (b * W[0, 0])
-    W[1, 1] = 1.0 / OFF_PLANE
-    W[2, 2] = 1.0 / sqrt(b + t * t * along)
-    return gtsam.OrientedPlane3Factor(
-        plane(alpha, r / cos(epsilon)),
-        gtsam.noiseModel.Gaussian.SqrtInformation(W),
-        pose_key(index),
-        line_key(line),
-    )
+    yield _line_factor(line, observation.pose, alpha, np.diag([1.0 / sqrt(along), 1.0 / OFF_PLANE, 0.0]))
+    weights, scale = np.zeros((3, 3)), cos(observation.epsilon) - t0 * sin(observation.epsilon) / r
+    sigma = sqrt(across - cross * t0) * abs(scale)
+    weights[0] = -hypot(r, t0) / sigma, 0.0, 1.0 / sigma  # Its row below the diagonal would not be read.
+    yield _line_factor(line, observation.pose, alpha + atan2(r, -t0), weights)
+
+
+def _line_factor(line: int, pose: int, alpha: float, weights: Float[np.ndarray, "3 3"]) -> gtsam.OrientedPlane3Factor:
+    noise = gtsam.noiseModel.Gaussian.SqrtInformation(weights)
+    return gtsam.OrientedPlane3Factor(plane(alpha, 0.0), noise, pose_key(pose), line_key(line))
 
 
 def _noise(cov_body: Float[np.ndarray, "3 3"]) -> gtsam.noiseModel.Gaussian:

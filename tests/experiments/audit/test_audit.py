@@ -66,7 +66,7 @@ def test_runs_with_a_truth_each_are_pooled_and_estimators_of_one_drive_compared(
     pooled = chainslam.audit([path for path, _ in paths], truth=[true for _, true in paths])
     assert pooled.pooled is not None
     assert pooled.pooled.runs == 3
-    assert pooled.pooled.anees == pytest.approx(np.mean([each.pose.anees for each in pooled.trajectories]))
+    assert pooled.pooled.mean == pytest.approx(np.mean([each.pose.anees for each in pooled.trajectories]))
     assert pooled.pairs == ()
     assert pooled.verdict[-1].startswith("3 runs together: ")
     half = tum(tmp_path / "half.tum", RUNS[0].time_s, RUNS[0].estimated, 0.5 * RUNS[0].covs)
@@ -86,6 +86,12 @@ def test_without_anything_to_compare_with_one_line_says_what_to_give(tmp_path, c
         ([str(true), "--truth", str(true)], "append 6 columns xx xy xt yy yt tt"),
         ([str(estimated), "--truth", str(true), "--reference-sigma", "0.1", "0.1"], "found no reference"),
         ([str(tmp_path), "--truth", str(true)], "without steps.csv"),
+        ([str(estimated), str(estimated), "--truth", str(true)], "2 times: name it once"),
+        ([str(estimated), "--truth", str(estimated)], "the same poses: name the truth"),
+        ([str(estimated), "--truth", str(true), "--topic", "/pose"], "expected --topic beside a ROS bag"),
+        ([str(estimated), "--relations", str(true), "--align", "start"], "expected --align beside --truth"),
+        (["--relations", str(true), "--error", "body"], "expected --error beside poses"),
+        ([str(tmp_path / "none.bag"), "--truth", str(true)], "expected a bag, found none at"),
     ):
         assert main(["audit", *words]) == 2
         said = capsys.readouterr().err

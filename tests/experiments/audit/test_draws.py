@@ -61,7 +61,7 @@ def test_the_interval_is_that_of_a_variance():
 
 def test_runs_together_have_the_degrees_of_freedom_of_all():
     one = score(lasting(300, 0.0))
-    assert pooled_dof([one] * 4) == pytest.approx(4.0 * one.dof)
+    assert pooled_dof([one.dof] * 4) == pytest.approx(4.0 * one.dof)
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.9, 0.98, 1.0 - 1e-12], ids=["white", "short", "long", "for ever"])

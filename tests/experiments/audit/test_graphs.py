@@ -110,6 +110,16 @@ def test_relations_of_many_graphs_have_the_covariance_that_the_graph_says(tmp_pa
     assert longer.low < 1.0 < longer.high
 
 
+@pytest.mark.long
+def test_of_60_graphs_few_are_rejected(tmp_path):
+    scores = []
+    for seed in range(60):
+        drive(tmp_path, seed=seed)
+        [found] = audit(tmp_path / "a.g2o", truth=tmp_path / "a_true.g2o").trajectories
+        scores.append(found.pose)
+    assert sum(each.low > 1.0 or each.high < 1.0 for each in scores) <= 6
+
+
 def test_edges_that_do_not_fit_are_told(tmp_path):
     drive(tmp_path, told=9.0)
     found = audit(tmp_path / "a.g2o", truth=tmp_path / "a_true.g2o").trajectories[0]
@@ -124,7 +134,11 @@ def test_edges_that_do_not_fit_are_told(tmp_path):
         ("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n", "found VERTEX_SE3:QUAT"),
         ("VERTEX_SE2 0 0 0\n", "with 4 numbers"),
         ("VERTEX_SE2 0 0 0 zero\n", "other words in line 1"),
-        ("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 0 0 0 1 0 0 1 0 1\n", "between vertices"),
+        ("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 0 0 0 1 0 0 1 0 1\n", "between vertices, found none of id 1: add it"),
+        ("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 0 0 0 0\n", "found 0 twice"),
+        ("VERTEX_SE2 0.5 0 0 0\n", "whole numbers as ids, found 0.5"),
+        ("VERTEX_SE2 8646911284551352320 0 0 0\n", "with 4 numbers within 1e+15"),
+        ("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 0 0 0 0 1 0 0 1 0 1\n", "found one at 0 only"),
         ("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 0 0 0\nVERTEX_SE2 2 0 0 0\nEDGE_SE2 0 1 0 0 0 1 0 0 1 0 1\n", "singular"),
     ],
 )
@@ -135,6 +149,19 @@ def test_a_graph_that_cannot_be_read_is_refused_in_one_line(text, told, tmp_path
         read(path)
     assert told in str(found.value)
     assert "\n" not in str(found.value)
+
+
+def test_what_is_odd_in_a_graph_is_told(tmp_path):
+    drive(tmp_path)
+    path = tmp_path / "a.g2o"
+    text = path.read_text()
+    for more, note in (
+        ("FIX 99", "FIX names no vertex of the graph, so 0 is held"),
+        ("FIX 3 4", "of the vertices that FIX names only 3 is held"),
+        ("EDGE_SE2 0 30 0 0 0 1 2 0 1 0 1", "the information of 1 edges has a negative eigenvalue"),
+    ):
+        path.write_text(f"{text}\n{more}\n")
+        assert graph_at(path).notes == (note,)
 
 
 def test_lines_of_other_kinds_are_counted(tmp_path):

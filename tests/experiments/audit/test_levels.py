@@ -121,7 +121,7 @@ def test_from_ten_runs_on_the_interval_is_that_over_runs_and_needs_no_degrees_of
     found, fewer = pool(runs), pool(runs[:9])
     assert (found.low, found.high) == mean_interval(np.array([each.anees for each in runs]))
     assert found.verdict.words == CAUTIOUS
-    assert (fewer.low, fewer.high) == interval(fewer.anees, 4.5)
+    assert (fewer.low, fewer.high) == interval(fewer.mean, 4.5)
     assert fewer.verdict.words == TOO_FEW
 
 

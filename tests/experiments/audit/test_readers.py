@@ -26,6 +26,7 @@ def test_six_columns_and_twenty_one_of_a_robot_in_the_plane_say_the_same(tmp_pat
     [
         ("time_s,x_m,y_m,heading_rad,cov_xx,cov_xy,cov_xt,cov_yy,cov_yt,cov_tt,behaviour", False),
         ("t, x, y, theta, xx, xy, xt, yy, yt, tt, note", False),
+        ("\xef\xbb\xbft,tx,ty,theta,xx,xy,xt,yy,yt,tt,note", False),
         ("timestamp,x,y,yaw,p_x_x,p_x_y,p_x_theta,p_y_y,p_y_theta,p_theta_theta,remark", False),
     ],
 )
@@ -33,7 +34,7 @@ def test_columns_of_a_table_are_found_by_their_names(header, degrees, tmp_path):
     upper = np.triu_indices(3)
     cells = np.column_stack([DRIVE.time_s, DRIVE.estimated, DRIVE.covs[:, upper[0], upper[1]]])
     rows = [",".join([*(f"{value:.17g}" for value in row), "follow"]) for row in cells]
-    (tmp_path / "a.csv").write_text("\n".join([header, *rows]))
+    (tmp_path / "a.csv").write_text("\n".join([header, *rows]), encoding="latin-1")
     found = read(tmp_path / "a.csv")
     assert found.poses_world == pytest.approx(np.column_stack([DRIVE.estimated[:, :2], found.poses_world[:, 2]]))
     assert found.used_covs == pytest.approx(DRIVE.covs)
@@ -56,6 +57,7 @@ def test_a_table_without_correlations_says_so(tmp_path):
         ("0 0 0 90 1 0 0 1 0 1\n1 0 0 180 1 0 0 1 0 1\n2 0 0 -180 1 0 0 1 0 1\n", "degrees?"),
         ("0 nan 0 0 1 0 0 1 0 1\n", "in row 1"),
         ("a,b,c\n1,2,3\n", "expected columns t, x, y and theta"),
+        ("t;x;y;theta\n0;0;0;0\n", "between blanks or commas, found other words"),
     ],
 )
 def test_what_is_no_trajectory_is_refused_in_one_line(text, told, tmp_path):
@@ -67,8 +69,23 @@ def test_what_is_no_trajectory_is_refused_in_one_line(text, told, tmp_path):
     assert "\n" not in str(found.value)
 
 
+def test_quaternions_with_w_first_are_told(tmp_path):
+    turn = 0.1 * np.arange(12.0)
+    zero = np.zeros(12)
+    np.savetxt(tmp_path / "a.tum", np.column_stack([turn, zero, zero, zero, np.cos(turn), zero, zero, np.sin(turn)]))
+    assert any("in the order w x y z" in note for note in read(tmp_path / "a.tum").notes)
+
+
+@pytest.mark.parametrize("name", ["a.mcap", "a.db3", "a.bag"])
+def test_bags_that_are_none_are_refused_in_one_line(name, tmp_path):
+    (tmp_path / name).write_bytes(b"none")
+    with pytest.raises(UsageError, match="expected a bag that can be read") as found:
+        audit(tmp_path / name, truth=tmp_path / name)
+    assert "\n" not in str(found.value)
+
+
 def test_a_robot_that_tilts_is_audited_in_the_plane_which_is_told(tmp_path):
-    q = np.array([0.3, 0.0, 0.0, np.sqrt(1 - 0.09)])
+    q = np.array([0.3, 0.2, 0.0, np.sqrt(1 - 0.13)])
     np.savetxt(tmp_path / "a.tum", np.array([[k, 0, 0, 0, *q, 1, 0, 0, 1, 0, 1] for k in range(3)]))
     assert read(tmp_path / "a.tum").notes == ("the robot tilts, and only x, y and yaw are audited",)
 

@@ -5,8 +5,10 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from ..reading.stated import Frame
+from ....scoring.without_truth.relation_noise import Misclosures, triangles
+from ....scoring.without_truth.relations import Relations
 from . import plane, space
+from .plane import Frame
 
 Poses = Float[np.ndarray, "n p"]
 Errors = Float[np.ndarray, "n d"]
@@ -20,8 +22,20 @@ class Geometry(Protocol):
     def errors(self, estimated: Poses, true: Poses, frame: Frame) -> Errors:
         """Return the errors of poses."""
 
-    def relative_errors(self, true_motions: Poses, motions: Poses) -> Errors:
-        """Return shift and turn between relative poses."""
+    def coordinates(self, motions: Poses) -> Errors:
+        """Return shift and turn of motions."""
+
+    def motions_of(self, coordinates: Errors) -> Poses:
+        """Return the motions of shifts and turns."""
+
+    def slopes(self, motions: Poses) -> Covs:
+        """Return the derivatives of the coordinates of motions by a small motion after each."""
+
+    def adjoint_of_inverse(self, motions: Poses) -> Covs:
+        """Return what makes a small motion before a motion into one after it."""
+
+    def composed(self, first: Poses, second: Poses) -> Poses:
+        """Return each motion of the first with that of the second after it."""
 
     def to_frame(self, estimated: Poses, covs: Covs, given: Frame, wanted: Frame) -> Covs:
         """Return covariances of errors in one frame as those in another."""
@@ -60,6 +74,13 @@ def parts(axes: int) -> tuple[slice, slice]:
     """Return which of the axes of errors, 3 or 6, are of the position, and which of the rotation."""
     at = 2 if axes == plane.NUMBERS else 3
     return slice(0, at), slice(at, axes)
+
+
+def misclosures(relations: Relations) -> Misclosures:
+    """Return how relations in the plane or in space close triangles."""
+    by, rows = geometry_of(relations.motions), triangles(relations)
+    ab, bc, ac = (relations.motions[column] for column in rows.T)
+    return Misclosures(rows, by.coordinates(by.between(ac, by.composed(ab, bc))), by.adjoint_of_inverse(bc))
 
 
 def since_start(

@@ -7,20 +7,24 @@ X is the true pose and X^ the estimated one, as elements of SE(2):
 - world: log(X X^^-1), left error: a turn about the origin of the world and a shift.
 """
 
+from typing import Literal
+
 import numpy as np
 from jaxtyping import Float
 
 from chainslam.slam.evaluation.consistency import pose_covariances, pose_errors
-from chainslam.slam.geometry.poses import J, rotation, wrap
+from chainslam.slam.geometry.poses import J, rotation, turned, wrap
 
 from ....scoring.trajectories import alignment_of_paths, moved
-from ....scoring.without_truth.relation_noise import body_covs, relation_covs
+from ....scoring.without_truth.relation_noise import adjoint_of_inverse, body_covs, composed, relation_covs
 from ....scoring.without_truth.relations import between, interpolated
-from ..reading.stated import Frame
+
+Frame = Literal["additive", "body", "world"]
 
 __all__ = [
-    "NUMBERS", "about", "alignment_of_paths", "between", "errors", "interpolated", "motion_at_start", "moved",
-    "moved_covs", "relation_covs", "relative_errors", "to_frame",
+    "NUMBERS", "Frame", "about", "adjoint_of_inverse", "alignment_of_paths", "between", "composed", "coordinates",
+    "errors", "interpolated", "motion_at_start", "motions_of", "moved", "moved_covs", "relation_covs",
+    "slopes", "to_frame",
 ]  # fmt: skip
 NUMBERS = 3
 """Of a pose: x m, y m, heading rad."""
@@ -76,6 +80,18 @@ def about(poses: Poses, place: Float[np.ndarray, "3"]) -> Poses:
     return np.column_stack([poses[:, :2] - place[:2], poses[:, 2]])
 
 
-def relative_errors(true_motions: Poses, motions: Poses) -> Poses:
-    """Return shift and turn between true relative poses and estimated ones, in the frames of the true ones."""
-    return between(true_motions, motions)
+def coordinates(motions: Poses) -> Poses:
+    """Return shift and turn of motions: these themselves."""
+    return motions
+
+
+def motions_of(coordinates: Poses) -> Poses:
+    """Return the motions of shifts and turns: these themselves."""
+    return coordinates
+
+
+def slopes(motions: Poses) -> Covs:
+    """Return the derivatives of the coordinates of motions by a small motion after each."""
+    found = np.tile(np.eye(3), (len(motions), 1, 1))
+    found[:, :2, 0], found[:, :2, 1] = (turned(np.tile(axis, (len(motions), 1)), motions[:, 2]) for axis in np.eye(2))
+    return found

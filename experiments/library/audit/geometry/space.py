@@ -13,7 +13,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from ....usage import UsageError
-from ..reading.stated import Frame
+from .plane import Frame
 
 Poses = Float[np.ndarray, "n 7"]
 Covs = Float[np.ndarray, "n 6 6"]
@@ -34,10 +34,37 @@ def errors(estimated: Poses, true: Poses, frame: Frame) -> Float[np.ndarray, "n 
     return np.column_stack([true[:, :3] - estimated[:, :3], turns.as_rotvec()])
 
 
-def relative_errors(true_motions: Poses, motions: Poses) -> Float[np.ndarray, "n 6"]:
-    """Return shift and turn between true relative poses and estimated ones, in the frames of the true ones."""
-    off = between(true_motions, motions)
-    return np.column_stack([off[:, :3], turns_of(off).as_rotvec()])
+def coordinates(motions: Poses) -> Float[np.ndarray, "n 6"]:
+    """Return shift and rotation vector of motions."""
+    return np.column_stack([motions[:, :3], turns_of(motions).as_rotvec()])
+
+
+def motions_of(coordinates: Float[np.ndarray, "n 6"]) -> Poses:
+    """Return the motions of shifts and rotation vectors."""
+    return _poses(coordinates[:, :3], Rotation.from_rotvec(coordinates[:, 3:]))
+
+
+def slopes(motions: Poses) -> Covs:
+    """Return the derivatives of the coordinates of motions by a small motion after each."""
+    found, turns = np.zeros((len(motions), 6, 6)), turns_of(motions)
+    found[:, :3, :3] = turns.as_matrix()
+    K = cross(turns.as_rotvec())
+    found[:, 3:, 3:] = np.eye(3) + 0.5 * K + _second(np.asarray(turns.magnitude()))[:, None, None] * (K @ K)
+    return found
+
+
+def adjoint_of_inverse(motions: Poses) -> Covs:
+    """Return Ad(M^-1) of each motion M: a small motion made before M, as it would be made after M."""
+    found, back = np.zeros((len(motions), 6, 6)), turns_of(motions).inv().as_matrix()
+    found[:, :3, :3] = found[:, 3:, 3:] = back
+    found[:, :3, 3:] = -back @ cross(motions[:, :3])
+    return found
+
+
+def composed(first: Poses, second: Poses) -> Poses:
+    """Return each motion of `first` with the one of `second` after it."""
+    turns = turns_of(first)
+    return _poses(first[:, :3] + turns.apply(second[:, :3]), turns * turns_of(second))
 
 
 def to_frame(estimated: Poses, covs: Covs, given: Frame, wanted: Frame) -> Covs:
@@ -110,10 +137,7 @@ def between(first: Poses, second: Poses) -> Poses:
 
 def relation_covs(motions: Poses, pair_covs: Float[np.ndarray, "m 12 12"]) -> Covs:
     """Return the covariance of relations, given those of both poses' errors together, each in its body frame."""
-    G, back = np.zeros((len(motions), 6, 12)), turns_of(motions).inv().as_matrix()
-    G[:, :3, :3] = G[:, 3:, 3:6] = -back
-    G[:, :3, 3:6] = back @ cross(motions[:, :3])
-    G[:, :, 6:] = np.eye(6)
+    G = np.concatenate([-adjoint_of_inverse(motions), np.broadcast_to(np.eye(6), (len(motions), 6, 6))], axis=-1)
     return np.asarray(G @ pair_covs @ G.swapaxes(1, 2))
 
 
@@ -133,13 +157,16 @@ def interpolated(
 def logarithm(poses: Poses) -> Float[np.ndarray, "n 6"]:
     """Return log of each pose in SE(3), translation first."""
     turns = turns_of(poses).as_rotvec()
-    angle = np.linalg.norm(turns, axis=1)
+    K = cross(turns)
+    back = np.eye(3) - 0.5 * K + _second(np.linalg.norm(turns, axis=1))[:, None, None] * (K @ K)
+    return np.column_stack([(back @ poses[:, :3, None])[..., 0], turns])
+
+
+def _second(angle: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return the coefficient of the second order in the inverse of the Jacobians of the exponential of rotations."""
     half = 0.5 * np.maximum(angle, SMALL_RAD)
     exact = (1.0 - half / np.tan(half)) / (4.0 * half**2)
-    second = np.where(angle > SMALL_RAD, exact, 1.0 / 12.0 + angle**2 / 720.0)
-    K = cross(turns)
-    back = np.eye(3) - 0.5 * K + second[:, None, None] * (K @ K)
-    return np.column_stack([(back @ poses[:, :3, None])[..., 0], turns])
+    return np.where(angle > SMALL_RAD, exact, 1.0 / 12.0 + angle**2 / 720.0)
 
 
 def turns_of(poses: Poses) -> Rotation:

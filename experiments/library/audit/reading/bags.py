@@ -21,6 +21,8 @@ def read_poses(path: Path, topic: str | None, needs_covariance: bool) -> Stated:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
+    if not path.exists():
+        raise UsageError(f"expected a bag, found none at {path}: name one that exists")
     place = path.parent if path.suffix in (".db3", ".mcap") and path.is_file() else path
     try:
         with (
@@ -30,7 +32,7 @@ def read_poses(path: Path, topic: str | None, needs_covariance: bool) -> Stated:
             chosen = _chosen(reader.connections, topic, needs_covariance, path)
             rows = [_row(reader.deserialize(raw, connection.msgtype))
                     for connection, _, raw in reader.messages(connections=chosen)]  # fmt: skip
-    except (UsageError, OSError):
+    except UsageError:
         raise
     except Exception as error:  # the reader may raise anything for a damaged bag
         words = " ".join(str(error).split())[:120] or type(error).__name__

@@ -11,11 +11,10 @@ from jaxtyping import Float, Int
 from scipy.sparse import bsr_array, coo_array, csr_array
 from scipy.sparse.linalg import splu
 
-from chainslam.slam.geometry.poses import J, turned, wrap
-
-from ....scoring.without_truth.relations import between
 from ....usage import UsageError
 from ....views.numbers import number
+from ..draws import Cross
+from ..geometry.kinds import Geometry, geometry_of
 from .stated import PairCovs
 
 AT_ONCE = 300
@@ -30,49 +29,56 @@ MOVED = 0.1
 
 @dataclass(frozen=True)
 class Graph:
-    """A pose graph of n poses and m relations."""
+    """A pose graph of n poses and m relations, in the plane or in space."""
 
     ids: Int[np.ndarray, " n"]
-    poses_world: Float[np.ndarray, "n 3"]
+    poses_world: Float[np.ndarray, "n p"]
     pairs: Int[np.ndarray, "m 2"]
     """Rows of the two poses of each edge."""
-    motions: Float[np.ndarray, "m 3"]
-    information: Float[np.ndarray, "m 3 3"]
+    motions: Float[np.ndarray, "m p"]
+    information: Float[np.ndarray, "m d d"]
+    """Of shift and turn of each motion: d is 3 in the plane, 6 in space."""
     fixed: int
     """Row of the pose that is held."""
     notes: tuple[str, ...]
+
+    @property
+    def axes(self) -> int:
+        """The number d of axes of errors."""
+        return self.information.shape[1]
+
+    @property
+    def by(self) -> Geometry:
+        """The geometry of its poses."""
+        return geometry_of(self.poses_world)
 
 
 @dataclass(frozen=True)
 class Linear:
     """The residuals of m edges and their derivatives by motions of n poses."""
 
-    off: Float[np.ndarray, "m 3"]
+    off: Float[np.ndarray, "m d"]
     jacobian: csr_array
-    """3 m x 3 n."""
+    """d m x d n."""
     residual: float
     """The chi-square of the edges."""
     solve: Callable[[Float[np.ndarray, "s c"]], Float[np.ndarray, "s c"]]
-    """The covariance of the poses, 3 n x 3 n, times c columns."""
+    """The covariance of the poses, d n x d n, times c columns."""
 
 
 def linearised(graph: Graph, name: str) -> Linear:
     """Return a graph linearised at its poses; raises UsageError where edges do not determine all of them."""
-    m, n = len(graph.pairs), len(graph.ids)
-    relative = between(graph.poses_world[graph.pairs[:, 0]], graph.poses_world[graph.pairs[:, 1]])
-    off = between(graph.motions, relative)
-    A, B = np.zeros((2, m, 3, 3))
-    back = -graph.motions[:, 2]
-    A[:, :2, 0], A[:, :2, 1] = (-turned(np.tile(axis, (m, 1)), back) for axis in np.eye(2))
-    A[:, :2, 2], A[:, 2, 2] = -turned(relative[:, :2] @ J.T, back), -1.0
-    B[:, :2, 0], B[:, :2, 1] = (turned(np.tile(axis, (m, 1)), off[:, 2]) for axis in np.eye(2))
-    B[:, 2, 2] = 1.0
-    rows = np.broadcast_to(3 * np.arange(m)[:, None, None] + np.arange(3)[:, None], (m, 3, 3))
-    columns = [np.broadcast_to(3 * ends[:, None, None] + np.arange(3), (m, 3, 3)) for ends in graph.pairs.T]
+    m, n, d, by = len(graph.pairs), len(graph.ids), graph.axes, graph.by
+    relative = by.between(graph.poses_world[graph.pairs[:, 0]], graph.poses_world[graph.pairs[:, 1]])
+    gaps = by.between(graph.motions, relative)
+    off, B = by.coordinates(gaps), by.slopes(gaps)
+    A = -B @ by.adjoint_of_inverse(relative)
+    rows = np.broadcast_to(d * np.arange(m)[:, None, None] + np.arange(d)[:, None], (m, d, d))
+    columns = [np.broadcast_to(d * ends[:, None, None] + np.arange(d), (m, d, d)) for ends in graph.pairs.T]
     cells = np.concatenate([A, B]).ravel(), (np.tile(rows.ravel(), 2), np.concatenate(columns).ravel())
-    jacobian = csr_array(coo_array(cells, shape=(3 * m, 3 * n)))
-    information = bsr_array((graph.information, np.arange(m), np.arange(m + 1)), shape=(3 * m, 3 * m))
-    free = np.delete(np.arange(3 * n), 3 * graph.fixed + np.arange(3))
+    jacobian = csr_array(coo_array(cells, shape=(d * m, d * n)))
+    information = bsr_array((graph.information, np.arange(m), np.arange(m + 1)), shape=(d * m, d * m))
+    free = np.delete(np.arange(d * n), d * graph.fixed + np.arange(d))
     H = (jacobian.T @ information @ jacobian).tocsc()[free][:, free].tocsc()
     try:
         solver = splu(H, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
@@ -90,28 +96,40 @@ def linearised(graph: Graph, name: str) -> Linear:
     return Linear(off, jacobian, residual, solve)
 
 
+def cross_covs_of(linear: Linear) -> Cross:
+    """Return what tells the covariances of all poses with some."""
+    d = linear.off.shape[1]
+
+    def cross_covs(some: Int[np.ndarray, " k"]) -> Float[np.ndarray, "n d k d"]:
+        columns = linear.solve(_units(d * some[:, None] + np.arange(d), linear.jacobian.shape[1]))
+        return columns.reshape(-1, d, len(some), d)
+
+    return cross_covs
+
+
 def pair_covs_of(linear: Linear) -> PairCovs:
     """Return what tells the joint covariance of two poses."""
+    d, cross_covs = linear.off.shape[1], cross_covs_of(linear)
 
-    def pair_covs(first: Int[np.ndarray, " m"], second: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 6 6"]:
-        covs = np.zeros((len(first), 6, 6))
-        axes, asked = np.arange(3), np.unique(second)
-        for part in np.array_split(asked, max(len(asked) // (AT_ONCE // 3), 1)):
-            columns = linear.solve(_units(3 * part[:, None] + axes, linear.jacobian.shape[1])).reshape(-1, len(part), 3)
+    def pair_covs(first: Int[np.ndarray, " m"], second: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m e e"]:
+        covs = np.zeros((len(first), 2 * d, 2 * d))
+        asked = np.unique(second)
+        for part in np.array_split(asked, max(len(asked) // (AT_ONCE // d), 1)):
+            columns = cross_covs(part)
             at = np.flatnonzero(np.isin(second, part))
             k = np.searchsorted(part, second[at])
-            cross, own = (columns[3 * rows[at, None] + axes, k[:, None]] for rows in (first, second))
-            covs[at, :3, 3:], covs[at, 3:, :3], covs[at, 3:, 3:] = cross, cross.swapaxes(1, 2), own
+            cross, own = (columns[rows[at], :, k] for rows in (first, second))
+            covs[at, :d, d:], covs[at, d:, :d], covs[at, d:, d:] = cross, cross.swapaxes(1, 2), own
         if np.array_equal(first, second):
-            covs[:, :3, :3] = covs[:, 3:, 3:]
+            covs[:, :d, :d] = covs[:, d:, d:]
         else:
-            covs[:, :3, :3] = pair_covs(first, first)[:, 3:, 3:]
+            covs[:, :d, :d] = pair_covs(first, first)[:, d:, d:]
         return covs
 
     return pair_covs
 
 
-def _units(rows: Int[np.ndarray, "k 3"], size: int) -> Float[np.ndarray, "s c"]:
+def _units(rows: Int[np.ndarray, "k d"], size: int) -> Float[np.ndarray, "s c"]:
     """Return columns that are 1 in one row each."""
     found = np.zeros((size, rows.size))
     found[rows.ravel(), np.arange(rows.size)] = 1.0
@@ -133,7 +151,8 @@ def optimised(graph: Graph, name: str) -> tuple[Graph, Linear, tuple[str, ...]]:
         if not gain > DONE:
             return graph, linear, _moved(graph, first, linear.residual)
         for halving in range(HALVINGS):
-            tried = replace(graph, poses_world=_stepped(graph.poses_world, 0.5**halving * step.reshape(-1, 3)))
+            motions = graph.by.motions_of(0.5**halving * step.reshape(-1, graph.axes))
+            tried = replace(graph, poses_world=graph.by.composed(graph.poses_world, motions))
             found = linearised(tried, name)
             if found.residual < linear.residual:
                 break
@@ -149,8 +168,3 @@ def _moved(graph: Graph, before: float, after: float) -> tuple[str, ...]:
     if before - after <= MOVED * len(graph.ids):
         return ()
     return (f"its poses were optimised first: chi-square {number(before)} to {number(after)}",)
-
-
-def _stepped(poses: Float[np.ndarray, "n 3"], steps: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """Return each pose after a motion in its own frame."""
-    return np.column_stack([poses[:, :2] + turned(steps[:, :2], poses[:, 2]), wrap(poses[:, 2] + steps[:, 2])])

@@ -16,10 +16,12 @@ from chainslam.slam.geometry.poses import wrap
 from ....artifacts.saved import read_summary
 from ....scoring.without_truth.references import lines_of
 from ....usage import UsageError
+from ..draws import Cross
+from ..geometry.plane import Frame
 
-Frame = Literal["additive", "body", "world"]
 Space = Literal["plane", "space"]
-PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.ndarray, "m 6 6"]]
+PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.ndarray, "m e e"]]
+"""Joint covariances of two poses, e = 6 in the plane and 12 in space, given their rows."""
 PLANE_TO_SPACE = (0, 1, 5)
 """Rows of x, y and yaw in the order of ROS: x y z roll pitch yaw."""
 UNIT = 0.02
@@ -27,6 +29,7 @@ UNIT = 0.02
 TRUTH = "trajectory_true.tum"
 """The true poses in the folder of a run."""
 TILTED = "the robot tilts, and only x, y and yaw are audited"
+SWAPPED = "the quaternions would not tilt in the order w x y z: is qw their first column?"
 TILTED_RAD = 0.2
 """A robot that is tilted by more does not move in the plane."""
 IN_SPACE = 7
@@ -39,9 +42,9 @@ FORMATS = (
 )
 NAMES = {
     "t": ("time", "time_s", "t", "timestamp", "stamp", "sec", "seconds"),
-    "x": ("x", "x_m", "px", "pose_x", "position_x"),
-    "y": ("y", "y_m", "py", "pose_y", "position_y"),
-    "z": ("z", "z_m", "pz", "pose_z", "position_z"),
+    "x": ("x", "x_m", "px", "tx", "pose_x", "position_x"),
+    "y": ("y", "y_m", "py", "ty", "pose_y", "position_y"),
+    "z": ("z", "z_m", "pz", "tz", "pose_z", "position_z"),
     "theta": ("theta", "theta_rad", "heading", "heading_rad", "yaw", "yaw_rad", "th", "phi"),
     **{name: (name, f"orientation_{name[1]}") for name in ("qx", "qy", "qz", "qw")},
 }
@@ -70,6 +73,8 @@ class Stated:
     """Row of the pose that is the frame of the others, and known in it."""
     pair_covs: PairCovs | None = None
     """The joint covariance of two poses, each in its body frame, given their rows."""
+    cross_covs: Cross | None = None
+    """The covariances of all poses with some, each in its body frame, given the rows of these."""
     truth: Path | None = None
     """The truth in the same folder."""
     estimator: str | None = None
@@ -85,6 +90,11 @@ class Stated:
         if self.covs is None or self.covs.shape[1] == 3 or self.poses_world.shape[1] == IN_SPACE:
             return self.covs
         return np.asarray(self.covs[:, PLANE_TO_SPACE][:, :, PLANE_TO_SPACE])
+
+    def cross_at(self, rows: Int[np.ndarray, " m"]) -> Cross | None:
+        """Return the covariances of the poses of some rows with each other, if they are known."""
+        of_poses = self.cross_covs
+        return None if of_poses is None else lambda some: of_poses(rows[some])[rows]
 
 
 def in_space(stated: Stated, needs_covariance: bool = True) -> Stated:
@@ -108,7 +118,10 @@ def in_space(stated: Stated, needs_covariance: bool = True) -> Stated:
 def read_folder(folder: Path) -> Stated:
     """Read the poses, covariances and truth of a run of ours; raises UsageError."""
     if not (folder / "steps.csv").is_file():
-        raise UsageError(f"expected a trajectory, found {folder} without steps.csv: name a file, or a run's folder")
+        raise UsageError(
+            f"expected a trajectory, found {folder} without steps.csv or a bag's metadata.yaml: name a file, the folder"
+            " of a run, or a bag"
+        )
     summary, truth = read_summary(folder), folder / TRUTH
     return replace(
         read_text(folder / "steps.csv"),
@@ -213,18 +226,28 @@ def symmetric(cells: Float[np.ndarray, "n w"], size: int) -> Float[np.ndarray, "
     return covs
 
 
-def heading_of(q: Float[np.ndarray, "n 4"], path: Path) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
-    """Return the yaw of quaternions (x, y, z, w), with a note where they are tilted; raises UsageError."""
+def unit(q: Float[np.ndarray, "n 4"], path: Path, of: str = "row") -> Float[np.ndarray, "n 4"]:
+    """Return quaternions made unit; raises UsageError, which names the row, where they are far from it."""
     length = np.linalg.norm(np.clip(q, -9.0, 9.0), axis=1)  # beyond, its square may be infinite
     if np.any(bad := ~(np.abs(length - 1.0) < UNIT)):
         raise UsageError(
-            f"expected unit quaternions qx qy qz qw in {path}, found one of length {length[bad][0]:.3g} in row"
+            f"expected unit quaternions qx qy qz qw in {path}, found one of length {length[bad][0]:.3g} in {of}"
             f" {np.flatnonzero(bad)[0] + 1}: correct it"
         )
-    x, y, z, w = (q / length[:, None]).T
-    tilt = float(np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0)).max())
-    notes = (TILTED,) if tilt > TILTED_RAD else ()
+    return np.asarray(q / length[:, None])
+
+
+def heading_of(q: Float[np.ndarray, "n 4"], path: Path) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
+    """Return the yaw of quaternions (x, y, z, w), with a note where they are tilted; raises UsageError."""
+    x, y, z, w = unit(q, path).T
+    notes: tuple[str, ...] = (TILTED,) if _tilt(x, y) > TILTED_RAD else ()
+    notes += (SWAPPED,) if notes and _tilt(y, z) <= TILTED_RAD else ()
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y**2 + z**2)), notes
+
+
+def _tilt(x: Float[np.ndarray, " n"], y: Float[np.ndarray, " n"]) -> float:
+    """Return the largest tilt, rad, of unit quaternions."""
+    return float(np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0)).max())
 
 
 def _in_radians(heading: Float[np.ndarray, " n"], path: Path) -> Float[np.ndarray, " n"]:
@@ -249,7 +272,9 @@ def table(path: Path) -> tuple[list[str] | None, Float[np.ndarray, "n w"]]:
             header = words
             continue
         if header is None and None in numbers:
-            raise UsageError(f"expected numbers in line {number} of {path}, found other words: correct it")
+            raise UsageError(
+                f"expected numbers in line {number} of {path}, between blanks or commas, found other words: correct it"
+            )
         if len(words) != len(header or rows[0] if header or rows else words):
             raise UsageError(
                 f"expected {len(header or rows[0])} columns in line {number} of {path}, found {len(words)}: correct it"

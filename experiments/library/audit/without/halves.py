@@ -44,7 +44,7 @@ def halves_of(stated: Sequence[Stated], options: Options) -> Audited:
         )
     both = replace(
         one, name=f"{one.name} against {other.name}", time_s=one.time_s[chosen], poses_world=one.poses_world[chosen],
-        covs=total[chosen], held=None, pair_covs=None, anees_from_start=None, spatial=None,
+        covs=total[chosen], held=None, pair_covs=None, cross_covs=None, anees_from_start=None, spatial=None,
     )  # fmt: skip
     against = replace(other, time_s=one.time_s[chosen], poses_world=at.poses_world[chosen], covs=None, spatial=None)
     found = audited(both, against, replace(options, nearest_s=None))

@@ -1,5 +1,6 @@
 """Normalised differences between data and their own prediction, and what can be told from them without a truth."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +12,7 @@ from chainslam.slam.estimation.gates import gate_level
 from ....campaign.comparison.consistency import OVERCONFIDENT
 from ....views.numbers import number, percent
 from ..draws import interval
-from ..verdicts import Verdict, judge
+from ..verdicts import Pooled, Verdict, judge, mean_of_runs
 
 INSIDE = 0.95
 SURE = 0.05
@@ -52,8 +53,15 @@ class Inner:
     notes: tuple[str, ...] = ()
     least: float = 1.0
     """The mean of a consistent series, where a gate cuts off the largest; 1 without."""
+    estimator: str = ""
+    """The back end of a run of ours."""
     is_judged: bool = True
     """Whether their scale is known; if it was estimated from themselves, only misfits are told."""
+
+    @property
+    def kind(self) -> str:
+        """What is alike in runs that can be pooled."""
+        return f"{self.told.what} of {self.estimator}" if self.estimator else self.told.what
 
     @property
     def mean(self) -> float:
@@ -75,11 +83,7 @@ class Inner:
         """The verdict on the subject; None if it cannot be judged."""
         if not self.is_judged:
             return None
-        low, high = self.interval
-        plain = judge(self.mean, low, high, self.effective_dof)
-        if plain.words == OVERCONFIDENT:
-            return plain
-        return judge(self.mean / self.least, low / self.least, high / self.least, self.effective_dof)
+        return _judged(self.mean, *self.interval, self.effective_dof, self.least)
 
     @property
     def covered(self) -> float:
@@ -132,6 +136,21 @@ class Inner:
             "misfits": [self.names[row] for row in self.misfits] if self.names else len(self.misfits),
             "tells": self.told.can, "cannot_tell": self.told.cannot, "notes": list(self.notes),
         }  # fmt: skip
+
+
+def pool(found: Sequence[Inner]) -> Pooled | None:
+    """Return the mean over independent runs of one kind with its verdict; None where their scale is not known."""
+    if not all(each.is_judged for each in found):
+        return None
+    mean, low, high, dof = mean_of_runs([each.mean for each in found], [each.effective_dof for each in found])
+    least = float(np.mean([each.least for each in found]))
+    return Pooled(len(found), mean, low, high, _judged(mean, low, high, dof, least), found[0].told.statistic)
+
+
+def _judged(mean: float, low: float, high: float, dof: float, least: float) -> Verdict:
+    """Return the verdict on a mean that ideally lies between `least` and 1."""
+    plain = judge(mean, low, high, dof)
+    return plain if plain.words == OVERCONFIDENT else judge(mean / least, low / least, high / least, dof)
 
 
 def _levels(probability: float, dof: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from chainslam.slam.estimation.gates import gate_level
+from chainslam.slam.estimation.gates import mean_inside
 
 from ....artifacts.files import CONFIG
 from ....artifacts.reading import read_plain, told
+from ....artifacts.saved import read_summary
 from ....usage import UsageError
 from ..draws import lasting
 from ..reading.stated import table
@@ -46,7 +47,7 @@ def innovations(folder: Path) -> Inner:
     notes = (f"{left} of {len(rows)} scans localised the robot by no match",) if left else ()
     return Inner(
         folder.resolve().name, TOLD, time_s[used], squared, whole, (), effective_dof(squared, whole), notes,
-        gated(_gate(folder / CONFIG)),
+        mean_inside(_gate(folder / CONFIG), 2), str(read_summary(folder)["backend"]),
     )  # fmt: skip
 
 
@@ -59,11 +60,6 @@ def _gate(path: Path) -> float:
     if not isinstance(found, float) or not 0.0 < found < 1.0:
         raise UsageError(f"expected the gate of the matching in {path}, found {str(found)[:40]}: repeat the run")
     return found
-
-
-def gated(gate: float) -> float:
-    """Return the mean NIS per degree of freedom of observations of two numbers that a gate of a probability lets in."""
-    return (1.0 - (1.0 - gate) * (1.0 + 0.5 * gate_level(gate, 2))) / gate
 
 
 def effective_dof(squared: Float[np.ndarray, " n"], dof: Int[np.ndarray, " n"]) -> float:

@@ -14,18 +14,16 @@ from jaxtyping import Float, Int
 
 from ....usage import UsageError
 from ....views.numbers import number
-from ..draws import evenly
-from ..reading.graphs import graph_at
+from ..draws import AT_ONCE, Cross, joint_dof
+from ..geometry.kinds import parts as axes_of
+from ..reading.graphs import Rotations, graph_at
 from ..reading.linear import Linear, optimised
+from ..reading.stated import Space
 from ..suspicions import definite
 from .inner import Inner, Told
 
 ALONE = 1e-6
 """How near to 1 the part of an edge in its own prediction is, in some direction, if nothing else determines it."""
-AT_ONCE = 100
-"""Closures whose correlations with all others are computed together."""
-MOST = 500
-"""Closures whose correlations with all others are computed; of more, an even choice."""
 TOLD = Told(
     "loop closures against the rest of the graph",
     "loop closures",
@@ -37,9 +35,9 @@ TOLD = Told(
 )
 
 
-def loops(path: Path) -> Inner:
+def loops(path: Path, space: Space = "plane", rotation: Rotations | None = None) -> Inner:
     """Return the loop closures of a g2o graph; raises UsageError if it has none that the rest predicts."""
-    graph = graph_at(path)
+    graph = graph_at(path, space, rotation)
     rows = np.flatnonzero(np.abs(np.diff(graph.pairs, axis=1)[:, 0]) > 1)
     if not len(rows):
         raise UsageError(
@@ -49,6 +47,8 @@ def loops(path: Path) -> Inner:
     usable = definite(graph.information[rows])
     rows, left = rows[usable], int(np.count_nonzero(~usable))
     notes += (f"{left} closures whose information is not positive definite are left out",) if left else ()
+    if not len(rows):
+        raise UsageError(f"expected loop closures in {path} with positive definite information, found none: correct it")
     roots = np.linalg.cholesky(graph.information[rows])
     parts, axes = np.linalg.eigh(roots.swapaxes(1, 2) @ _own(linear, rows) @ roots)
     known = 1.0 - parts[:, -1] > ALONE
@@ -66,46 +66,46 @@ def loops(path: Path) -> Inner:
     order = np.argsort(ends.max(axis=1), kind="stable")
     return Inner(
         path.name, TOLD, ends.max(axis=1)[order].astype(np.float64), np.sum(white**2, axis=1)[order],
-        np.full(len(rows), 3), tuple(names[row] for row in order), _dof(linear, rows, whiten), (*graph.notes, *notes),
+        np.full(len(rows), graph.axes), tuple(names[row] for row in order), joint_dof(whiten, _cross(linear, rows)),
+        (*graph.notes, *notes),
     )  # fmt: skip
 
 
 def _shifts(
     linear: Linear,
     rows: Int[np.ndarray, " m"],
-    roots: Float[np.ndarray, "m 3 3"],
-    parts: Float[np.ndarray, "m 3"],
-    axes: Float[np.ndarray, "m 3 3"],
+    roots: Float[np.ndarray, "m d d"],
+    parts: Float[np.ndarray, "m d"],
+    axes: Float[np.ndarray, "m d d"],
 ) -> list[float]:
     """Return how far, m, each closure is from its prediction without it."""
     turned = axes.swapaxes(1, 2) @ roots.swapaxes(1, 2) @ linear.off[rows, :, None]
     back = np.linalg.solve(roots.swapaxes(1, 2), axes @ (turned / (1.0 - parts)[:, :, None]))
-    return np.hypot(back[:, 0, 0], back[:, 1, 0]).tolist()
+    position, _ = axes_of(back.shape[1])
+    return np.linalg.norm(back[:, position, 0], axis=1).tolist()
 
 
-def _own(linear: Linear, rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 3 3"]:
+def _own(linear: Linear, rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m d d"]:
     """Return the covariance of the prediction of each edge, itself included."""
-    found = []
+    found, d = [], linear.off.shape[1]
     for part in np.array_split(rows, -(-len(rows) // AT_ONCE)):
-        G = linear.jacobian[_cells(part)]
-        blocks = (G @ linear.solve(G.T.toarray())).reshape(len(part), 3, len(part), 3)
+        G = linear.jacobian[_cells(part, d)]
+        blocks = (G @ linear.solve(G.T.toarray())).reshape(len(part), d, len(part), d)
         found.append(np.einsum("iaib->iab", blocks))
     return np.concatenate(found)
 
 
-def _dof(linear: Linear, rows: Int[np.ndarray, " m"], whiten: Float[np.ndarray, "m 3 3"]) -> float:
-    """Return the degrees of freedom of the sum of the squares of all."""
-    m, total = len(rows), 0.0
-    chosen = evenly(m, MOST)
-    every = linear.jacobian[_cells(rows)]
-    for part in np.array_split(chosen, -(-len(chosen) // AT_ONCE)):
-        cross = every @ linear.solve(linear.jacobian[_cells(rows[part])].T.toarray())
-        K = np.einsum("iab,ibjc,jdc->iajd", whiten, cross.reshape(m, 3, len(part), 3), whiten[part], optimize=True)
-        K[part, :, np.arange(len(part))] = np.eye(3)
-        total += float(np.sum(K**2)) * m / len(chosen)
-    return (3.0 * m) ** 2 / total
+def _cross(linear: Linear, rows: Int[np.ndarray, " m"]) -> Cross:
+    """Return what tells the covariances of the predictions of edges, itself included, with each other."""
+    d, every = linear.off.shape[1], linear.jacobian[_cells(rows, linear.off.shape[1])]
+
+    def cross(some: Int[np.ndarray, " k"]) -> Float[np.ndarray, "m d k d"]:
+        found = every @ linear.solve(linear.jacobian[_cells(rows[some], d)].T.toarray())
+        return np.asarray(found.reshape(len(rows), d, len(some), d))
+
+    return cross
 
 
-def _cells(rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " r"]:
+def _cells(rows: Int[np.ndarray, " m"], axes: int) -> Int[np.ndarray, " r"]:
     """Return the rows of the residuals of edges."""
-    return (3 * rows[:, None] + np.arange(3)).ravel()
+    return (axes * rows[:, None] + np.arange(axes)).ravel()

@@ -9,16 +9,11 @@ from scipy.sparse import bsr_array
 from chainslam.slam.evaluation.consistency import nees
 
 from ....scoring.without_truth.references import read_relations
-from ....scoring.without_truth.relation_noise import (
-    Sigmas,
-    adjoint_of_inverse,
-    composed,
-    sigmas_of_relations,
-    triangles,
-)
-from ....scoring.without_truth.relations import between
+from ....scoring.without_truth.relation_noise import Sigmas
 from ....usage import UsageError
 from ....views.numbers import number
+from ..geometry.kinds import misclosures
+from ..reading.stated import Space
 from .inner import Inner, Told
 
 LEAST = 10
@@ -42,23 +37,22 @@ ESTIMATED = Told(
 )
 
 
-def closures(path: Path, stated: tuple[float, float] | None) -> Inner:
+def closures(path: Path, stated: tuple[float, float] | None, space: Space = "plane") -> Inner:
     """Return how triangles of relations close, by their stated standard deviations (m, rad) or by estimated ones.
 
     Raises UsageError where too few triangles close.
     """
-    relations = read_relations(path)
-    rows = triangles(relations)
-    estimated = sigmas_of_relations(relations)
+    relations = read_relations(path, space == "space")
+    found = misclosures(relations)
+    rows, d, estimated = found.rows, found.left.shape[1], found.sigmas
     if len(rows) < LEAST or estimated is None:
         raise UsageError(
             f"expected at least {LEAST} triangles of relations in {path} (a to b, b to c and a to c), found"
             f" {len(rows)}: give a trajectory to compare them with"
         )
     sigmas = estimated if stated is None else Sigmas(*stated)
-    ab, bc, ac = (relations.motions[column] for column in rows.T)
-    back = adjoint_of_inverse(bc)
-    left, covs = between(ac, composed(ab, bc)), 2.0 * sigmas.cov + back @ sigmas.cov @ back.swapaxes(1, 2)
+    own = sigmas.cov_of(d)
+    covs = found.covs(own)
     order = np.argsort(relations.first_s[rows[:, 0]], kind="stable")
     notes = () if stated is None else (f"estimated from the triangles it is {_told(estimated)}",)
     told = _with(_told(estimated)) if stated is None else JUDGED
@@ -67,8 +61,8 @@ def closures(path: Path, stated: tuple[float, float] | None) -> Inner:
     )]  # fmt: skip
     whiten = np.linalg.inv(np.linalg.cholesky(covs))
     return Inner(
-        path.name, told, relations.first_s[rows[:, 0]][order], nees(left, covs)[order], np.full(len(rows), 3),
-        tuple(times[row] for row in order), _dof(rows, back, whiten, np.sqrt(sigmas.cov), len(relations.motions)),
+        path.name, told, relations.first_s[rows[:, 0]][order], nees(found.left, covs)[order], np.full(len(rows), d),
+        tuple(times[row] for row in order), _dof(rows, found.back, whiten, np.sqrt(own), len(relations.motions)),
         notes, is_judged=stated is not None,
     )  # fmt: skip
 
@@ -83,8 +77,8 @@ def _with(sigmas: str) -> Told:
 
 def _dof(rows: np.ndarray, back: np.ndarray, whiten: np.ndarray, root: np.ndarray, count: int) -> float:
     """Return the degrees of freedom of the sum of all squares: triangles that share a relation are correlated."""
-    t = len(rows)
-    of = np.stack([whiten @ back @ root, whiten @ root, -whiten @ root], axis=1).reshape(-1, 3, 3)
-    B = bsr_array((of, rows.ravel(), 3 * np.arange(t + 1)), shape=(3 * t, 3 * count)).tocsr()
+    t, d = len(rows), len(root)
+    of = np.stack([whiten @ back @ root, whiten @ root, -whiten @ root], axis=1).reshape(-1, d, d)
+    B = bsr_array((of, rows.ravel(), 3 * np.arange(t + 1)), shape=(d * t, d * count)).tocsr()
     K = B.T @ B if count < t else B @ B.T
-    return (3.0 * t) ** 2 / float(K.power(2).sum())
+    return (d * t) ** 2 / float(K.power(2).sum())

@@ -10,7 +10,7 @@ import chainslam
 from chainslam.experiments.campaign.comparison.consistency import OVERCONFIDENT
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.library.audit.draws import interval
-from chainslam.experiments.library.audit.without.innovations import effective_dof, gated
+from chainslam.experiments.library.audit.without.innovations import effective_dof
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +38,25 @@ def test_a_run_with_a_truth_is_judged_by_it_unless_asked_and_one_without_by_its_
     assert found.without_truth[0].mean == pytest.approx(chainslam.load(run).summary["nis"], rel=1e-6)
     assert chainslam.audit(run, without_truth=True).asked == ("chainslam", "audit", str(run), "--without-truth")
     assert "NIS" in chainslam.audit(real).report(tmp_path / "out").read_text()
+
+
+def test_runs_of_one_back_end_are_pooled_and_others_told_one_by_one(run, tmp_path, capsys):
+    for name, backend in (("one", None), ("two", None), ("other", "block-ekf")):
+        shutil.copytree(run, tmp_path / name / "run")
+        if backend is not None:
+            path = tmp_path / name / "run" / "summary.json"
+            path.write_text(path.read_text().replace('"full-ekf"', f'"{backend}"'))
+    one, two, other = (tmp_path / name / "run" for name in ("one", "two", "other"))
+    assert main(["audit", str(one), str(two), "--without-truth"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].startswith("run (1): observation and motion model")
+    assert told[-1].startswith("2 runs together: ")
+    assert "mean NIS per degree of freedom" in told[-1]
+    found = chainslam.audit([one, two], without_truth=True)
+    assert found.pooled.mean == pytest.approx(found.without_truth[0].mean)
+    assert main(["audit", str(one), str(other), "--without-truth"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last == "not pooled, since they are of different kinds: scans of full-ekf, scans of block-ekf"
 
 
 def test_innovations_four_times_as_large_reject_the_models(run, tmp_path):
@@ -100,10 +119,3 @@ def test_values_that_scatter_more_than_a_chi_square_count_less():
     rng = np.random.default_rng(2)
     squared = rng.chisquare(2, 2000) * np.where(rng.random(2000) < 0.1, 10.0, 0.1)
     assert effective_dof(squared, np.full(2000, 2)) < 0.5 * 4000
-
-
-@pytest.mark.parametrize("gate", [0.9, 0.99])
-def test_the_mean_behind_a_gate_is_that_of_a_simulation(gate):
-    drawn = np.random.default_rng(3).chisquare(2, 400_000)
-    kept = drawn[drawn <= np.quantile(drawn, gate)]
-    assert gated(gate) == pytest.approx(kept.mean() / 2.0, rel=0.01)

@@ -9,9 +9,11 @@ import pytest
 from chainslam.experiments.campaign.comparison.consistency import OVERCONFIDENT
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.library.audit.auditing import audit
+from chainslam.experiments.library.audit.draws import interval
 from chainslam.experiments.library.audit.reading import linear
 from chainslam.experiments.library.audit.reading.graphs import graph_at
 from chainslam.experiments.library.audit.reading.linear import optimised, pair_covs_of
+from chainslam.experiments.library.audit.without.inner import pool
 from chainslam.experiments.library.audit.without.loops import loops
 from chainslam.experiments.usage import UsageError
 
@@ -82,6 +84,31 @@ def test_information_four_times_too_large_is_found_and_a_true_one_not_suspected(
         assert other.effective_dof == pytest.approx(one.effective_dof)
 
 
+def test_graphs_without_a_truth_are_pooled(tmp_path, capsys):
+    for seed in range(3):
+        drive(tmp_path, seed=seed, told=4.0, name=f"g{seed}")
+    paths = [tmp_path / f"g{seed}.g2o" for seed in range(3)]
+    found = audit(paths)
+    assert found.pooled.mean == pytest.approx(np.mean([each.mean for each in found.without_truth]))
+    dof = 9.0 / sum(1.0 / each.effective_dof for each in found.without_truth)
+    assert (found.pooled.low, found.pooled.high) == pytest.approx(interval(found.pooled.mean, dof))
+    assert found.pooled.verdict.words == OVERCONFIDENT
+    assert main(["audit", *map(str, paths), "--out", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().out
+    assert "3 runs together: overconfident by a factor of" in told
+    assert "mean NEES per degree of freedom" in told
+    record = json.loads((tmp_path / "out" / "audit.json").read_text())["pooled"]
+    assert (record["statistic"], record["mean"]) == ("NEES per degree of freedom", found.pooled.mean)
+    assert "3 runs together" in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.long
+def test_of_20_groups_of_five_true_graphs_few_are_rejected(tmp_path):
+    every = list(drawn(tmp_path, 100))
+    found = [pool(every[k : k + 5]) for k in range(0, 100, 5)]
+    assert sum(each.low > 1.0 or each.high < 1.0 for each in found) <= 3
+
+
 def with_line(path, of, change):
     lines = path.read_text().splitlines()
     [k] = [k for k, line in enumerate(lines) if line.startswith(of)]
@@ -117,6 +144,15 @@ def test_a_graph_that_is_not_optimised_is_optimised_and_told(tmp_path, monkeypat
     monkeypatch.setattr(linear, "ROUNDS", 2)
     with pytest.raises(UsageError, match="does not converge: optimise it"):
         loops(tmp_path / "a.g2o")
+
+
+def test_closures_without_positive_definite_information_are_refused(tmp_path):
+    w = (SIGMAS**-2.0).tolist()
+    lines = [f"VERTEX_SE2 {k} {k} 0 0" for k in range(3)]
+    lines += [f"EDGE_SE2 {k} {k + 1} 1 0 0 {w[0]} 0 0 {w[1]} 0 {w[2]}" for k in range(2)]
+    (tmp_path / "a.g2o").write_text("\n".join([*lines, "EDGE_SE2 0 2 2 0 0 1 2 0 1 0 1"]))
+    with pytest.raises(UsageError, match="with positive definite information, found none"):
+        audit(tmp_path / "a.g2o")
 
 
 @pytest.mark.parametrize(

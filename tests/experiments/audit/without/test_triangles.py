@@ -7,6 +7,8 @@ from chainslam.experiments.campaign.comparison.consistency import OVERCONFIDENT
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.library.audit.auditing import audit
 from chainslam.experiments.library.audit.without.triangles import closures
+from chainslam.experiments.scoring.without_truth.references import read_relations
+from chainslam.experiments.scoring.without_truth.relation_noise import sigmas_of_relations
 from chainslam.experiments.usage import UsageError
 from chainslam.slam.geometry.poses import compose, inverse
 
@@ -40,6 +42,15 @@ def test_a_true_sigma_is_rarely_rejected_and_half_of_it_always(tmp_path):
     assert sum(outside) <= 6
 
 
+def test_the_sigma_that_triangles_tell_is_right_in_the_mean_with_a_relation_wrong_or_none(tmp_path):
+    for wrong in (0.0, 2.0):
+        found = [
+            sigmas_of_relations(read_relations(relations(tmp_path / "r", seed=seed, wrong=wrong))) for seed in range(40)
+        ]
+        assert np.mean([each.translation_m for each in found]) == pytest.approx(0.03, rel=0.017)
+        assert np.mean([each.rotation_rad for each in found]) == pytest.approx(0.01, rel=0.017)
+
+
 def test_the_command_estimates_the_sigma_and_names_what_does_not_close(tmp_path, capsys):
     path = relations(tmp_path / "r", wrong=2.0)
     assert main(["audit", "--relations", str(path), "--out", str(tmp_path / "out")]) == 0
@@ -60,5 +71,8 @@ def test_relations_without_triangles_are_refused(tmp_path):
     (tmp_path / "r").write_text("0 1 1 0 0 0 0 0\n1 2 1 0 0 0 0 0\n")
     with pytest.raises(UsageError, match=r"at least 10 triangles .* found 0: give a trajectory"):
         audit([], relations=tmp_path / "r")
+    (tmp_path / "degrees").write_text("0 1 1 0 0 0 0 90\n")
+    with pytest.raises(UsageError, match="in radians in degrees, found 90"):
+        audit([], relations=tmp_path / "degrees")
     with pytest.raises(UsageError, match="correct it"):
         audit([], relations=tmp_path / "r", reference_sigma=(-1.0, 0.1))

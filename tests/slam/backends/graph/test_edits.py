@@ -1,13 +1,12 @@
-"""What only a graph can do: merge without a loss, go on from a file."""
+"""What only a graph can do: merge without a loss."""
 
 import numpy as np
 import pytest
 
-from chainslam.slam.backends.graph.batch import GraphBatch
 from chainslam.slam.backends.graph.graph import Graph
-from chainslam.slam.estimation.backend import StaleBeliefError
+from chainslam.slam.estimation.backend import Observations, StaleBeliefError
 from chainslam.slam.robot import Odometry
-from tests.slam.backends.trips import ODOMETRY_COV, P0, START, Trip, assert_same, everything
+from tests.slam.backends.trips import P0, START, Trip, assert_same, everything
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 
@@ -27,7 +26,7 @@ def test_a_merged_run_equals_one_that_was_never_split():
     assert_same(split.belief.joint(order), whole.belief.joint(order), place=3e-4, angle=3e-4, cov=1e-3)
 
 
-@pytest.mark.parametrize("verb", ["merge", "trajectory", "relinearise", "arrays"])
+@pytest.mark.parametrize("verb", ["merge", "trajectory", "relinearise"])
 def test_what_only_a_graph_can_do_makes_beliefs_stale_too(verb):
     trip = Trip.record(11, steps=20)
     backend = trip.run(Graph(START, P0))
@@ -38,27 +37,15 @@ def test_what_only_a_graph_can_do_makes_beliefs_stale_too(verb):
     everything(backend)
 
 
-@pytest.mark.parametrize("kind", [Graph, GraphBatch])
-def test_saved_arrays_make_the_same_graph(kind, tmp_path):
-    trip = Trip.record(12)
-    backend = trip.run(kind(START, P0), walls_of=lambda k, i: 99 if i == 1 and k > 30 else i)
-    backend.merge(trip.ids[1], trip.ids[99])
-    backend.remove([trip.ids[2]])
-    backend.predict(Odometry(trip.motions[0], ODOMETRY_COV))
-    np.savez(tmp_path / "graph.npz", **backend.arrays())
-    with np.load(tmp_path / "graph.npz", allow_pickle=False) as arrays:
-        again = kind.from_arrays(arrays)
-    a, b = everything(again), everything(backend)
-    np.testing.assert_array_equal(again.belief.ids, backend.belief.ids)
-    assert_same(a, b, place=1e-6, angle=1e-6, cov=1e-5)
-    np.testing.assert_allclose(again.trajectory(), backend.trajectory(), atol=1e-6)
-    line, cov, centre = trip.seen[0][0][1:]
-    assert again.grow(line[None], cov[None], centre[None]) == backend.grow(line[None], cov[None], centre[None])
-    if kind is GraphBatch:
-        np.testing.assert_allclose(again.finish(), backend.finish(), atol=1e-8)
-
-
-def test_another_format_is_refused():
-    arrays = Graph(START, P0).arrays()
-    with pytest.raises(ValueError, match="format"):
-        Graph.from_arrays({**arrays, "format": np.array(99)})
+@pytest.mark.parametrize("turn_rad", [-0.2, 0.0, 0.1])
+def test_an_observation_is_weighed_by_the_angle_by_which_it_departs_from_its_line(turn_rad):
+    """The odometry is certain of the heading, so that the pose does not turn to explain it."""
+    graph = Graph(np.zeros(3), 1e-6 * np.eye(3))
+    cov = np.diag([0.05, 0.01])[None] ** 2
+    ids = graph.grow(np.array([[0.3, 2.0]]), cov, np.array([[1.9, 0.6]]))
+    graph.predict(Odometry(np.array([0.1, 0.0, 0.0]), np.diag([1e-4, 1e-4, 1e-12])))
+    seen = Observations(ids, np.array([[0.3 + turn_rad, 1.9]]), cov)
+    graph.update(seen, seen)
+    first, again = graph.record.lines[int(ids[0])].observations
+    assert first.epsilon == pytest.approx(0.0, abs=1e-9)
+    assert again.epsilon == pytest.approx(turn_rad, abs=1e-3)

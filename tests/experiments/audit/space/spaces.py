@@ -35,8 +35,11 @@ def vee(X):
     return np.array([*X[:3, 3], X[2, 1], X[0, 2], X[1, 0]])
 
 
-def fixes(steps, seed):
-    """Return times, true and estimated poses and body covariances of an EKF in SE(3) that measures its pose."""
+def fixes(steps, seed, told=1.0):
+    """Return times, true and estimated poses and body covariances of an EKF in SE(3) that measures its pose.
+
+    It is told `told` times the covariance of its measurements.
+    """
     rng, motion = np.random.default_rng(seed), pose([0.2, 0.0, 0.02], [0.01, -0.02, 0.05])
     Q = np.diag([0.02, 0.01, 0.01, 0.004, 0.004, 0.01]) ** 2
     R = np.diag([0.05, 0.05, 0.1, 0.02, 0.02, 0.03]) ** 2
@@ -49,7 +52,7 @@ def fixes(steps, seed):
         true = true @ matrix(motion) @ expm(hat(rng.multivariate_normal(np.zeros(6), Q)))
         mean, P = mean @ matrix(motion), Ad @ P @ Ad.T + Q
         seen = true @ expm(hat(rng.multivariate_normal(np.zeros(6), R)))
-        K = P @ np.linalg.inv(P + R)
+        K = P @ np.linalg.inv(P + told * R)
         mean = mean @ expm(hat(K @ vee(logm(np.linalg.inv(mean) @ seen))))
         P = (np.eye(6) - K) @ P
         P = 0.5 * (P + P.T)
