@@ -55,21 +55,20 @@ class SessionStudy:
     def run(self) -> None:
         """Explore what is to be explored and print the table; raises UsageError."""
         plans = plans_in(self.plans, self.named, self.count)
-        explored(plans, self.backend, 1, self.runs, self.jobs, as_drawn)
         tasks = [((plan, self.backend, self.runs), [(plan.stem, self.backend)]) for plan in plans]
-        rows = rows_of(self.out, ("plan", "backend"), tasks, _second, self.jobs)
+        rows = rows_of(self.out, ("plan", "backend"), tasks, _both, self.jobs)
         plain_console(width=170).print(table(list(rows)))
 
 
-def _second(task: tuple[Path, str, Path]) -> Sequence[Row]:
+def _both(task: tuple[Path, str, Path]) -> Sequence[Row]:
     """Return the row of a second session, which starts anywhere on the floor that the robot can reach."""
     plan, backend, runs = task
+    [first] = explored([plan], backend, 1, runs, 1, as_drawn)
     world, chance = load_world(str(plan)), np.random.default_rng(int(plan.stem.split("_")[1], 16))
     room = world.reachable().buffer(-MARGIN_M)
     while not shapely.contains_xy(room, *(place := chance.uniform(room.bounds[:2], room.bounds[2:]))):
         pass
     start = (*map(float, place), float(chance.uniform(-np.pi, np.pi)))
-    first = runs / f"{plan.stem}-{backend}-1"
     trial = TrialConfig(str(plan), backend, seed=2, start=start, map=str(first))
     folder = runs / f"{plan.stem}-{backend}-2"
     driven = begin(trial, load_world(str(plan), start), folder, True, lambda scenario: nullcontext(_unwatched))
