@@ -180,8 +180,9 @@ bodies: setup
 scanner-apartments: setup
 	$(BIN)/python -m studies.robots.apartments --plans $(PLANS)
 
-# Logs of real robots, each through several back ends; begun again, it goes on where it was.
+# Logs of real robots, each by offline refinement alone and through several back ends; begun again, it goes on where it was.
 logs: setup
+	$(BIN)/python -m studies.logs.refined --logs $(or $(LOGS),../shared/data/logs)
 	$(BIN)/python -m studies.logs.study --logs $(or $(LOGS),../shared/data/logs)
 
 # Other scanners and their faults, in one world; begun again, it goes on where it was.
@@ -230,7 +231,7 @@ structure: setup
 
 # Does a second session find its place in the map of the first, and is the map of both consistent? 40 apartments.
 sessions: setup
-	$(BIN)/python -m studies.plans.sessions --plans $(PLANS) --runs results/plans --out results/sessions.jsonl
+	$(BIN)/python -m studies.plans.sessions --plans $(PLANS) --runs results/plans
 
 # Of 100 runs, how many of the 95 % intervals between corners hold the truth, run by run?
 intervals: setup

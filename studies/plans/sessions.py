@@ -27,6 +27,10 @@ RIGHT_M, RIGHT_RAD = 0.3, np.deg2rad(5.0)
 """A place is right if it is no farther off."""
 MARGIN_M = 0.05
 """The second session starts with so much room around the robot, at least."""
+HEAD = (
+    "back end", "plans", "place: right, wrong", "several places, none", "scans until placed, median",
+    "place off by, cm: median, most", "map ANEES of both: mean, median", "pose ANEES of the second: mean, median",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -45,27 +49,26 @@ class SessionStudy:
     """Number of processes."""
     runs: Path = Path("results/plans")
     """Folder of the runs of the first sessions; those that are there are not driven again."""
-    out: Path = Path("results/sessions.jsonl")
+    out: Path = Path("studies/results/rows/sessions.jsonl")
     """A line of JSON for each apartment. What it holds of the same code already is not run again."""
 
     def run(self) -> None:
         """Explore what is to be explored and print the table; raises UsageError."""
         plans = plans_in(self.plans, self.named, self.count)
-        explored(plans, self.backend, 1, self.runs, self.jobs, as_drawn)
         tasks = [((plan, self.backend, self.runs), [(plan.stem, self.backend)]) for plan in plans]
-        rows = rows_of(self.out, ("plan", "backend"), tasks, _second, self.jobs)
-        plain_console(width=120).print(table(list(rows)))
+        rows = rows_of(self.out, ("plan", "backend"), tasks, _both, self.jobs)
+        plain_console(width=170).print(table(list(rows)))
 
 
-def _second(task: tuple[Path, str, Path]) -> Sequence[Row]:
+def _both(task: tuple[Path, str, Path]) -> Sequence[Row]:
     """Return the row of a second session, which starts anywhere on the floor that the robot can reach."""
     plan, backend, runs = task
+    [first] = explored([plan], backend, 1, runs, 1, as_drawn)
     world, chance = load_world(str(plan)), np.random.default_rng(int(plan.stem.split("_")[1], 16))
     room = world.reachable().buffer(-MARGIN_M)
     while not shapely.contains_xy(room, *(place := chance.uniform(room.bounds[:2], room.bounds[2:]))):
         pass
     start = (*map(float, place), float(chance.uniform(-np.pi, np.pi)))
-    first = runs / f"{plan.stem}-{backend}-1"
     trial = TrialConfig(str(plan), backend, seed=2, start=start, map=str(first))
     folder = runs / f"{plan.stem}-{backend}-2"
     driven = begin(trial, load_world(str(plan), start), folder, True, lambda scenario: nullcontext(_unwatched))
@@ -86,27 +89,35 @@ def _unwatched(step: Step) -> None:
 
 
 def table(rows: Sequence[Row]) -> Table:
-    """Return how many second sessions found their place, and the scores of the map of both."""
-    placed = [row for row in rows if row["first_step"]]
-    right = [row for row in placed if row["off_m"] < RIGHT_M and row["off_rad"] < RIGHT_RAD]
-    scans = [row["placed_at_step"] - row["first_step"] + 1 for row in placed]
-    shown = Table(title=f"a second session in {len(rows)} plans", title_justify="left", show_header=False)
-    shown.add_row("place right", f"{len(right)}")
-    shown.add_row("place wrong", f"{len(placed) - len(right)}")
-    shown.add_row("several places named", f"{sum(row['places'] > 1 for row in rows if not row['first_step'])}")
-    shown.add_row("no place", f"{sum(row['places'] < 2 for row in rows if not row['first_step'])}")
-    if placed:
-        shown.add_row("scans until placed, median, most", f"{np.median(scans):.0f}, {max(scans)}")
-        off = np.array([row["off_m"] for row in right])
-        shown.add_row("off by, median, most", f"{100 * np.median(off):.1f} cm, {100 * off.max():.1f} cm")
-    for key, words in (("map_anees", "map ANEES of both"), ("pose_anees", "pose ANEES of the second session"),
-                       ("pose_anees_from_start", "pose ANEES from the start")):  # fmt: skip
-        values = np.array([row[key] for row in placed if row[key] is not None], dtype=np.float64)
-        if len(values) > 1:
-            shown.add_row(words, f"{values.mean():.2f} ({interval_words(values)}), median {np.median(values):.2f}")
-    complete = sum(row["status"] == "complete" for row in placed)
-    shown.add_row("complete", f"{complete} of {len(placed)}")
+    """Return a row for each back end: how many second sessions found their place, and the scores of the map of both."""
+    shown = Table(title="Second sessions", title_justify="left")
+    for column in HEAD:
+        shown.add_column(column, justify="left" if column == HEAD[0] else "right")
+    for backend in dict.fromkeys(row["backend"] for row in rows):
+        shown.add_row(f"`{backend}`", *_cells([row for row in rows if row["backend"] == backend]))
     return shown
+
+
+def _cells(rows: Sequence[Row]) -> list[str]:
+    placed, lost = ([row for row in rows if bool(row["first_step"]) is found] for found in (True, False))
+    right = [row for row in placed if row["off_m"] < RIGHT_M and row["off_rad"] < RIGHT_RAD]
+    several = sum(row["places"] > 1 for row in lost)
+    scans = [row["placed_at_step"] - row["first_step"] + 1 for row in placed]
+    off_cm = [100 * row["off_m"] for row in right]
+    return [
+        str(len(rows)),
+        f"{len(right)}, {len(placed) - len(right)}",
+        f"{several}, {len(lost) - several}",
+        f"{np.median(scans):.0f}" if placed else "-",
+        f"{np.median(off_cm):.1f}, {max(off_cm):.1f}" if right else "-",
+        *(_score(placed, name) for name in ("map_anees", "pose_anees")),
+    ]
+
+
+def _score(rows: Sequence[Row], name: str) -> str:
+    """Return the mean of a score, the 95 % interval of that mean, and the median."""
+    values = np.array([row[name] for row in rows if row[name] is not None], dtype=np.float64)
+    return f"{values.mean():.2f} {interval_words(values, 2)}, {np.median(values):.2f}" if len(values) else "-"
 
 
 if __name__ == "__main__":

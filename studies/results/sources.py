@@ -7,8 +7,9 @@ from pathlib import Path
 
 from chainslam.experiments.campaign.comparison import benchmark
 
-from ..logs import matched_drives, study, surveys
+from ..logs import matched_drives, refined, study, surveys
 from ..paper import following, following_tables, page
+from ..plans import sessions
 from ..robots import apartments, bumps, faults
 from ..runner.rows import Row, last, newest
 from . import benchmarks, plans, worlds
@@ -50,11 +51,11 @@ SOURCES: Mapping[str, Source] = {
     "benchmark-exploration": Source("make apartments schools-whole schools", benchmarks.exploration, PLANS),
     "benchmark-paper": Source("make paper", benchmarks.figures, DRIVES),
     "benchmark-logs": Source("make logs", benchmarks.logs, LOGS),
+    "benchmark-refined": Source("make logs", _printed(refined), partial(last, refined.ROWS, refined.NAMES)),
+    "benchmark-sessions": Source("make sessions", _printed(sessions), _of("sessions")),
     "benchmark-faults": Source("make robots", benchmarks.endings, FAULTS),
     "benchmark-speed": Source(
-        "make bundled apartments schools logs",
-        benchmarks.speed,
-        lambda: [*_of("bundled-noisy", "apartments", "schools")(), *LOGS()],
+        "make bundled apartments schools", benchmarks.speed, _of("bundled-noisy", "apartments", "schools")
     ),
     "headlines": Source(
         "make rivals apartments logs", benchmarks.headlines, lambda: [*RIVALS(), *_of("apartments")(), *LOGS()]
