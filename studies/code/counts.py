@@ -22,7 +22,7 @@ TUNED = ("slam", "explore")
 """The rooms whose numbers decide what is mapped and where the robot drives."""
 PLAIN = (0, 1, 2, -1)
 """Numbers in a condition that say "none", "one", "both" or "the last" and are not chosen."""
-LAYOUT = ("POSE", "POSE_ROWS", "LINE_ROWS", "FORMAT", "NANO", "ROOM", "SPARE", "TINY", "LEAST_SIGMA")
+LAYOUT = ("POSE", "POSE_ROWS", "LINE_ROWS", "NANO", "ROOM", "SPARE", "TINY", "LEAST_SIGMA")
 """Constants that are no choice: shapes of arrays and files, room that is kept for more, and where arithmetic ends."""
 HALF = 0.5
 """No choice either, but in a comparison: the middle of two."""

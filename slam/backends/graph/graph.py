@@ -194,7 +194,9 @@ class Graph:
         if version != self._version:
             raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
         rows = self._rows(ids)
-        return self._joint(rows, self._isam.joint_cov(rows))
+        cov, belief = self._joint(rows, self._isam.joint_cov(rows)).cov, self.belief
+        cov[:3, :3] = belief.pose_cov  # by sums of another size it would be rounded otherwise
+        return Joint(np.concatenate([belief.pose_world, belief.means[rows].ravel()]), cov, belief.anchors[rows])
 
     def _joint(self, rows: Int[np.ndarray, " m"], cov: Float[np.ndarray, "s s"]) -> Joint:
         mean, anchors = np.concatenate([self._ahead.pose, self._means[rows].ravel()]), self._inner_anchors[rows]
