@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from chainslam.experiments.campaign.comparison import benchmark
 from chainslam.experiments.reproductions import REPRODUCTIONS
 
 from ..paper.page import cell
@@ -36,6 +37,10 @@ QUOTED = {
 """Figures and quantities that the page quotes, and its words for them."""
 ESTIMATORS = "block-ekf", "full-ekf"
 PLACE, LEFT_OUT = "apartments", "ring of 60 m"
+ALIKE = "relocation-ekf", "iterated-ekf", "oc-ekf", "joint-block-ekf"
+"""Variants that lie close to a back end that the page shows; all results have them."""
+RANKED = "estimator", "pose ANEES", "path error, cm", "closed: complete"
+"""Columns of the leaderboard that the page shows."""
 SHOWN = "block-ekf", "full-ekf", "invariant-ekf", "graph"
 EXPLORER, LOG = "invariant-ekf", "intel"
 """What the README shows: the place, the back ends in it, who explores, and a log; and a place between two others."""
@@ -49,12 +54,21 @@ def estimators(rows: Sequence[Row]) -> Table:
     table: Table = [["back end", *places, f"error, stated sigma over those of `{WHOLE}`"]]
     by = by_backend(rows)
     for name, mine in by.items():
+        if name in ALIKE:
+            continue
         own = ([row for row in there if row["backend"] == name] for there in places.values())
         scores = (
             ", ".join(short(mean_of(each, score)) for score in ("pose_anees_from_start", "map_anees")) for each in own
         )
         table.append([f"`{name}`", *scores, ratios(mine, by[WHOLE])])
     return table
+
+
+def leaderboard(rows: Sequence[Row]) -> Table:
+    """Return the columns of the leaderboard by which estimators are ranked and known to finish."""
+    head, *lines = benchmark.table(rows)
+    kept = [head.index(name) for name in RANKED]
+    return [[line[column] for column in kept] for line in (head, *lines)]
 
 
 def exploration(rows: Sequence[Row]) -> Table:

@@ -47,7 +47,8 @@ PLANS, LOGS = _of("apartments", "schools-whole", "schools"), partial(study.store
 FOLLOWING, FAULTS = partial(last, following.ROWS, following.NAMES), partial(last, faults.ROWS, faults.NAMES)
 SOURCES: Mapping[str, Source] = {
     "benchmark-estimators": Source("make rivals", benchmarks.estimators, RIVALS),
-    "benchmark-leaderboard": Source("make leaderboard", benchmark.table, _of("leaderboard", each="estimator")),
+    "benchmark-leaderboard": Source("make leaderboard", benchmarks.leaderboard, _of("leaderboard", each="estimator")),
+    "leaderboard": Source("make leaderboard", benchmark.table, _of("leaderboard", each="estimator")),
     "benchmark-exploration": Source("make apartments schools-whole schools", benchmarks.exploration, PLANS),
     "benchmark-paper": Source("make paper", benchmarks.figures, DRIVES),
     "benchmark-logs": Source("make logs", benchmarks.logs, LOGS),
