@@ -69,6 +69,19 @@ def test_geojson_is_told_by_its_content(tmp_path, truth, name):
     assert world.labels == {"B": (3.0, 3.0)}
 
 
+def test_a_point_of_kind_start_is_the_start_and_one_that_says_nothing_is_told(tmp_path):
+    walls = [[[a, b], [c, d]] for a, b, c, d in WALLS]
+    features = [
+        {"type": "Feature", "properties": {}, "geometry": {"type": "MultiLineString", "coordinates": walls}},
+        {"type": "Feature", "properties": {"kind": "Start"}, "geometry": {"type": "Point", "coordinates": START}},
+        {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [3, 3]}},
+    ]
+    world = load(_save(tmp_path, "map.geojson", json.dumps({"type": "FeatureCollection", "features": features})))
+    assert tuple(world.start[:2]) == START
+    assert "left out: 1 feature of kinds that are no walls" in world.reading.notes
+    assert world.labels == {}
+
+
 def test_a_collection_of_geometries_is_read_part_by_part(tmp_path, truth):
     lines = [{"type": "LineString", "coordinates": [[a, b], [c, d]]} for a, b, c, d in WALLS]
     block = {"type": "Polygon", "coordinates": [[*BLOCK, BLOCK[0]]]}

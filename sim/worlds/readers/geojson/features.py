@@ -89,7 +89,8 @@ def _about(node: dict[str, Any], properties: dict[str, Any], is_own: bool, level
     names = (node.get("id"), properties.get("id"), properties.get("name"))
     called = [str(n) for n in names if isinstance(n, str | int) and not isinstance(n, bool)]
     turn = numbers([properties.get("heading", 0.0)], (1,), "heading", "1.57")
-    best = "start" if "start" in [name.lower() for name in called] else name_of(called[-1]) if called else None
+    marks = [*called, properties["kind"]] if isinstance(properties.get("kind"), str) else called
+    best = "start" if "start" in [mark.lower() for mark in marks] else name_of(called[-1]) if called else None
     is_imdf = isinstance(node.get("feature_type"), str)
     if is_imdf:
         properties = {**properties, "feature_type": node["feature_type"]}

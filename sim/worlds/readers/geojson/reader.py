@@ -1,10 +1,11 @@
 """GeoJSON: LineStrings are walls, Polygons are rooms or solid, named Points are the start and labels.
 
-A Point whose id, or property `id` or `name`, is `start` marks the start (optional property `heading` in rad); any other
-named Point is a label. The kind of a feature is a property (`kind`, `type`, `indoor`, ...: `room`, `solid`, `door`,
-`level`, ...); without one, the shape of a Polygon decides (see `rooms`). Doors may be lines, points or polygons: solid
-parts there are removed, unless that would open the building to its outside. Of several storeys one is read. A map
-written by chainslam can be read as a world: its closed chains are rooms and islands, its open chains walls.
+A Point whose id, or property `id`, `name` or `kind`, is `start` marks the start (optional property `heading` in rad);
+any other named Point is a label. The kind of a feature is a property (`kind`, `type`, `indoor`, ...: `room`, `solid`,
+`door`, `level`, ...); without one, the shape of a Polygon decides (see `rooms`). Doors may be lines, points or
+polygons: solid parts there are removed, unless that would open the building to its outside. Of several storeys one is
+read. A map written by chainslam can be read as a world: its closed chains are rooms and islands, its open chains
+walls.
 """
 
 from collections.abc import Sequence
@@ -178,6 +179,8 @@ def _add_point(found: _Found, at: Float[np.ndarray, "2"], about: About) -> None:
         found.door_points.append((at, about.width))
     elif about.name is not None:
         found.points[about.name] = np.array([at[0], at[1], about.heading])
+    else:
+        found.left_out += 1
 
 
 def _add_line(found: _Found, line: shapely.LineString, about: About) -> None:
