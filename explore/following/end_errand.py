@@ -47,8 +47,8 @@ class EndErrand(Errand):
             whole = whole or self._planner(around, None)
             if self._look_from(places_near(ideal[self._stage], self.end, floor, whole, config), around, whole):
                 return True
-            beyond = places_beyond(self.end, around.walls, floor, whole, config)
-            if LOOKS[self._stage] in BEYOND and self._look_from(beyond, around, whole):
+            farther = LOOKS[self._stage] in BEYOND
+            if farther and self._look_from(places_beyond(self.end, around.walls, floor, whole, config), around, whole):
                 return True
             self._stage += 1
         if self.looks_done:

@@ -170,7 +170,7 @@ EXPLORATION = (
     _off("moved ends", "an end whose estimate has moved is viewed afresh",
          (END, "if np.hypot(*(end.position_world - self.end.position_world)) > self._config.moved_m:", "if False:")),
     _off("other viewpoints", "an end is viewed from elsewhere where no ideal viewpoint can be reached",
-         (END, "if LOOKS[self._stage] in BEYOND and self._look_from(beyond, around, whole):", "if False:"),
+         (END, "farther = LOOKS[self._stage] in BEYOND", "farther = False"),
          (END, "        if self.looks_done:\n            return False", "        return False")),
     _off("round things", "ends on a curved obstacle are given up without a view",
          (EXPLORER, "elif looks and is_round(end, around.walls, self._config.round_things):", "elif False:")),

@@ -51,3 +51,20 @@ def test_an_end_that_comes_and_goes_is_set_aside_once_its_place_took_the_patienc
         ask(explorer, replace(situation, chains=()))
     reasons = [each.reason for each in ask(explorer, there)[1]]
     assert reasons == [f"still open after {patience + 1} steps there"]
+
+
+@pytest.mark.parametrize(("apart", "is_one_place"), [(0.9, True), (1.1, False)])
+def test_steps_are_counted_for_all_ends_that_are_near_each_other(scene_of, apart, is_one_place):
+    """The end comes back as often as it goes, now here and now there."""
+    scene, patience = scene_of(3), 6
+    config = replace(NO_SWEEP, patience_m=patience * 0.15)
+    pose, explorer = told_at(scene, config)
+    situation = scene.situation(pose, [(0, 1)])
+    (chain,) = situation.chains
+    (end, *_) = chain.open_ends
+    shift = np.array([apart * config.near_m, 0.0])
+    for turn in range(patience + 2):
+        moved = replace(end, wall=turn % 2, position_world=end.position_world + shift * (turn % 2))
+        aside = ask(explorer, replace(situation, chains=(replace(chain, open_ends=(moved,)),)))[1]
+        ask(explorer, replace(situation, chains=()))
+    assert bool(aside) == is_one_place
