@@ -5,9 +5,10 @@ from dataclasses import replace
 import pytest
 
 from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.explore.following.wall_following import FollowingConfig
 from chainslam.explore.goals import explorer as explorer_module
 from chainslam.explore.outcome import Outcome
-from tests.explore.goals.scripted import ask, ends_at, explorer_at
+from tests.explore.goals.scripted import NO_SWEEP, Scripted, ask, ends_at, explorer_at
 
 
 def test_what_lies_beyond_the_fence_is_set_aside_without_a_look(scripted, scene):
@@ -29,6 +30,35 @@ def test_what_lies_on_something_round_is_set_aside_without_a_look(scripted, scen
     assert [(end.wall, end.reason) for end in decision.given_up.ends] == [(0, "on a curved obstacle")]
     assert decision.goal.wall == 1
     assert len(made) == 1
+
+
+@pytest.fixture
+def papers(monkeypatch):
+    """The paper's errand as a script that goes on for long."""
+    made = []
+    script = {"made": made, "steps": 99, "is_open": lambda self, ends: True}
+    monkeypatch.setattr(explorer_module, "PaperErrand", type("PaperErrand", (Scripted,), script))
+    return made
+
+
+PAPER = replace(NO_SWEEP, following=FollowingConfig(method="paper"), patience_m=0.45)
+
+
+def test_the_paper_follows_walls_round_pillars_too(papers, scene, monkeypatch):
+    monkeypatch.setattr(explorer_module, "is_round", lambda end, walls, config: True)
+    decision = ask(explorer_at(scene, config=PAPER), scene, ends_at((5, 2), (2, 2)))
+    assert not decision.given_up.ends
+    assert decision.goal.wall == 0
+
+
+def test_the_paper_follows_a_wall_to_its_end_however_long_it_is(papers, scene):
+    """Three steps are the patience of this explorer."""
+    explorer, ends = explorer_at(scene, config=PAPER), ends_at((5, 2))
+    for _ in range(9):
+        decision = ask(explorer, scene, ends)
+        assert decision.command is not None
+        assert not decision.given_up.ends
+    assert len(papers) == 1
 
 
 @pytest.mark.parametrize("aside", [0, 2])

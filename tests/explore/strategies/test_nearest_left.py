@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from chainslam.explore.planning.driving_field import DrivingField
 from chainslam.explore.strategies.nearest import nearest_left
 
 
@@ -30,3 +31,12 @@ def test_where_all_floor_was_seen_it_goes_to_what_is_no_wall_of_the_map_until_on
     assert choice.holds(situation.around)
     assert not choice.holds(mapped.around)
     assert nearest_left(mapped, sweep=True) is None
+
+
+def test_what_no_way_leads_to_is_not_chosen(scene_of, look, monkeypatch):
+    scene = scene_of(0, 0)
+    look(scene, scene.places[:1], 1.5)
+    situation = scene.situation(np.append(scene.places[0], 0.0), [])
+    assert nearest_left(situation, sweep=True) is not None
+    monkeypatch.setattr(DrivingField, "metres", lambda _, places_world: np.full(len(places_world), np.inf))
+    assert nearest_left(situation, sweep=True) is None
