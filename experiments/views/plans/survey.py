@@ -27,7 +27,9 @@ OVERLAP_M = 0.5
 THICKEST_M = 0.6
 FACES_OVERLAP_M = 0.3
 FURNITURE_M2 = 4.0
-"""What stands alone in a room is furniture if it covers less than this; otherwise it is a part of the building."""
+"""What stands alone in a room is furniture if it covers less than this; otherwise it is a part of the building ..."""
+THIN_M, PIECE_M = 0.2, 1.0
+"""... as is a piece of wall: on average no thicker than this, and at least as long."""
 CLUTTER_M = 1.0
 """A shorter open chain is clutter if it stands by itself."""
 
@@ -122,12 +124,18 @@ def _lengths(faces: Faces, loose: set[int]) -> list[Dimension]:
 
 
 def _furniture(faces: Faces) -> set[int]:
+    """Return the walls of closed chains that surround something small which is no piece of wall."""
     found: set[int] = set()
     for chain, closed in zip(faces.chains, faces.closed, strict=True):
-        ring = shapely.LinearRing(faces.ends_world[list(chain), 0]) if closed and len(chain) > 2 else None
-        if closed and (ring is None or (not ring.is_ccw and shapely.Polygon(ring).area < FURNITURE_M2)):
+        ring = shapely.Polygon(faces.ends_world[list(chain), 0] if closed and len(chain) > 2 else None)
+        if closed and not ring.exterior.is_ccw and ring.area < FURNITURE_M2 and not _is_piece_of_wall(ring):
             found |= set(chain)
     return found
+
+
+def _is_piece_of_wall(ring: shapely.Polygon) -> bool:
+    half_m = 0.5 * ring.length
+    return half_m >= PIECE_M and ring.area <= THIN_M * half_m
 
 
 def _clutter(faces: Faces, held: set[int]) -> set[int]:

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
+from shapely.geometry.polygon import orient
 
 from chainslam.experiments.views.plans.faces import END, Node
 from chainslam.experiments.views.plans.measuring import Kind, commonest, value_of
@@ -68,6 +70,19 @@ def test_furniture_has_no_dimensions_and_takes_no_area():
     assert not any(set(each.walls) & found.furniture for each in found.dimensions)
 
 
+@pytest.mark.parametrize(
+    ("thick_m", "low_m", "high_m", "is_wall"), [(0.1, 0.9, 2.1, True), (0.4, 0.9, 2.1, False), (0.1, 1.0, 1.7, False)]
+)
+def test_a_piece_of_wall_that_stands_alone_divides_rooms_and_a_cupboard_does_not(thick_m, low_m, high_m, is_wall):
+    """Between the piece and the walls of a room of 8 x 3 m there is an opening on either side."""
+    floor = shapely.box(0, 0, 8, 3).difference(shapely.box(4, low_m, 4 + thick_m, high_m))
+    faces = mapped(orient(floor, 1.0))
+    found = survey(faces)
+    assert found.furniture == (set() if is_wall else set(faces.chains[1]))
+    assert (thick_m in of_kind(found, Kind.THICKNESS)) == is_wall
+    assert (4.0 in of_kind(found, Kind.WIDTH)) == is_wall
+
+
 def test_a_wall_that_stops_has_an_end_known_to_centimetres():
     whole = mapped(two_rooms())
     faces = replace(whole, chains=(whole.chains[0][1:-1],), closed=(False,))
@@ -79,8 +94,6 @@ def test_a_wall_that_stops_has_an_end_known_to_centimetres():
 
 
 def test_a_gap_between_ends_is_an_opening_once_the_robot_saw_through_it():
-    import shapely
-
     faces = mapped(two_rooms())
     jambs = [row for row in range(len(faces)) if faces.lengths_m[row] < 0.2]
     chains = [chain for row in range(len(faces)) if row not in jambs for chain in [(row,)]]
