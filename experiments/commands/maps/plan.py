@@ -66,7 +66,7 @@ class Plan:
         }
         found(files=[str(file) for file in files], **counts)
         say(
-            ", ".join(f"{value} {name}" for name, value in counts.items())
+            ", ".join(f"{value} {name.removesuffix('s') if value == 1 else name}" for name, value in counts.items())
             + f"; chainslam measure {self.folder}{' --structure' if self.structure else ''} lists them"
         )
         return 0
