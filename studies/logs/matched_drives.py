@@ -18,6 +18,7 @@ from chainslam.experiments.trial import run_trial
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
+from ..runner.tables import headed
 
 ROWS = Path("studies/logs/matched_drives.jsonl")
 NAMES = ("world", "backend", "odometry", "seed")
@@ -76,9 +77,7 @@ def _one(key: tuple[str, str, OdometrySource, int]) -> list[Row]:
 
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each world, back end and kind of odometry."""
-    shown = Table(title="Worlds explored by wheels and by scans", title_justify="left")
-    for column in HEAD:
-        shown.add_column(column, justify="left" if column in HEAD[:3] else "right")
+    shown = headed("Worlds explored by wheels and by scans", HEAD, 3)
     for kind in sorted({tuple(row[name] for name in NAMES[:3]) for row in rows}):
         of = [row for row in rows if tuple(row[name] for name in NAMES[:3]) == kind]
         shown.add_row(*kind, *_cells(of))

@@ -32,6 +32,7 @@ from chainslam.slam.geometry.poses import compose, inverse
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
+from ..runner.tables import headed
 
 SCAN = b"FLASER"
 NAMES = ("map", "log")
@@ -97,9 +98,7 @@ def _against(logs: Path, name: str, half: TrialResult) -> tuple[Float[np.ndarray
 
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each pair; of two buildings there is no place to be off from."""
-    shown = Table(title="Halves of logs placed in saved maps", title_justify="left")
-    for column in HEAD:
-        shown.add_column(column, justify="left" if column in HEAD[:2] else "right")
+    shown = headed("Halves of logs placed in saved maps", HEAD, 2)
     for row in rows:
         cells = ["-"] * 3
         if "off" in row:

@@ -22,6 +22,7 @@ from chainslam.experiments.views.plans.survey import survey_at
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
+from ..runner.tables import headed
 
 ROWS = Path("studies/logs/refined.jsonl")
 NAMES = ("log",)
@@ -78,9 +79,7 @@ def _one(logs: Path, name: str) -> list[Row]:
 
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each log; what nobody measured is left out."""
-    shown = Table(title="Logs of real robots by offline refinement alone", title_justify="left")
-    for column in HEAD:
-        shown.add_column(column, justify="left" if column == HEAD[0] else "right")
+    shown = headed("Logs of real robots by offline refinement alone", HEAD)
     for row in rows:
         relations, path = row.get("relations_smoothed"), row.get("reference_smoothed")
         scored = (row.get(f"{kind}_normalised") for kind in ("relations_smoothed", "reference"))

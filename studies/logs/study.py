@@ -25,6 +25,7 @@ from chainslam.slam.backends import BACKENDS
 
 from ..runner.command import run_study
 from ..runner.rows import Row, last, read, rows_of
+from ..runner.tables import headed
 
 ROWS = Path("studies/logs/rows.jsonl")
 NAMES = ("log", "backend", "odometry", "every")
@@ -105,9 +106,7 @@ def _log(row: Row) -> tuple[Any, ...]:
 
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each run and one for each refined log; what nobody measured is left out."""
-    shown = Table(title="Logs of real robots", title_justify="left")
-    for column in HEAD:
-        shown.add_column(column, justify="left" if column in HEAD[:3] else "right")
+    shown = headed("Logs of real robots", HEAD, 3)
     for log in dict.fromkeys(map(_log, rows)):
         own = [row for row in rows if _log(row) == log]
         for row in own:

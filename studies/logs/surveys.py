@@ -34,6 +34,7 @@ from chainslam.slam.geometry.poses import rotation
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
+from ..runner.tables import headed
 
 ROWS = Path("studies/logs/surveys.jsonl")
 NAMES = ("world", "bow_m", "seed")
@@ -134,9 +135,7 @@ def scores(survey: Survey, true_world: Float[np.ndarray, "s 3"]) -> dict[str, An
 
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each world and kind of walls: means over the runs, and the median run's median."""
-    shown = Table(title="Second looks against the truth: 1 is honest, more is overconfident", title_justify="left")
-    for column in HEAD:
-        shown.add_column(column, justify="left" if column == HEAD[0] else "right")
+    shown = headed("Second looks against the truth: 1 is honest, more is overconfident", HEAD)
     for world, bow_m in sorted({(row["world"], row["bow_m"]) for row in rows}):
         of = [row for row in rows if (row["world"], row["bow_m"]) == (world, bow_m)]
         shown.add_row(world, f"{bow_m:g}", str(len(of)), *_cells(of, "poses"), *_cells(of, "relations"))

@@ -21,6 +21,7 @@ from chainslam.slam.geometry.poses import wrap
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 from ..runner.scores import interval_words
+from ..runner.tables import headed
 from .runs import as_drawn, explored, plans_in
 
 RIGHT_M, RIGHT_RAD = 0.3, np.deg2rad(5.0)
@@ -90,9 +91,7 @@ def _unwatched(step: Step) -> None:
 
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each back end: how many second sessions found their place, and the scores of the map of both."""
-    shown = Table(title="Second sessions", title_justify="left")
-    for column in HEAD:
-        shown.add_column(column, justify="left" if column == HEAD[0] else "right")
+    shown = headed("Second sessions", HEAD)
     for backend in dict.fromkeys(row["backend"] for row in rows):
         shown.add_row(f"`{backend}`", *_cells([row for row in rows if row["backend"] == backend]))
     return shown

@@ -19,6 +19,7 @@ from chainslam.sim.robot import RobotConfig
 
 from ..runner.command import run_study
 from ..runner.rows import Row
+from ..runner.tables import headed
 from ..runner.trials import rows_of
 
 ROBOT = RobotConfig(
@@ -77,9 +78,7 @@ class ApartmentsStudy:
 
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each plan."""
-    shown = Table(title=f"{len(rows)} apartments, 541 beams over 270 degrees", title_justify="left")
-    for column in HEAD:
-        shown.add_column(column, justify="left" if column in HEAD[:2] else "right")
+    shown = headed(f"{len(rows)} apartments, 541 beams over 270 degrees", HEAD, 2)
     for row in rows:
         numbers = (f"{row[name]:.2f}" if row.get(name) is not None else "-" for name in ("pose_anees", "map_anees"))
         shown.add_row(

@@ -24,6 +24,7 @@ from chainslam.slam.geometry.poses import wrap
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
+from ..runner.tables import headed
 
 NAMES = ("beams", "world", "backend", "seed", "max_steps", "share", "bump_deg")
 HEAD = (
@@ -125,9 +126,7 @@ def recoveries(
 
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each scanner."""
-    shown = Table(title="Turns that the wheels do not report", title_justify="left")
-    for column in HEAD:
-        shown.add_column(column, justify="right")
+    shown = headed("Turns that the wheels do not report", HEAD, 0)
     for beams in dict.fromkeys(row["beams"] for row in rows):
         own = [row for row in rows if row["beams"] == beams]
         found = [(steps, row) for row in own for steps in row["recovered_after"]]

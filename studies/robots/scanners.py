@@ -19,6 +19,7 @@ from chainslam.sim.robot import RobotConfig
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
+from ..runner.tables import headed
 from ..runner.trials import one
 
 HEAD = (
@@ -108,9 +109,7 @@ def _one_of(study: ScannersStudy, task: tuple[str, int]) -> list[Row]:
 
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each case: its runs, and its steps over those of the same scanner without the fault."""
-    shown = Table(title="Scanners and their faults", title_justify="left")
-    for column in HEAD:
-        shown.add_column(column, justify="left" if column == HEAD[0] else "right")
+    shown = headed("Scanners and their faults", HEAD)
     steps: dict[str, dict[int, int]] = {}
     for row in rows:
         steps.setdefault(row["case"], {})[row["seed"]] = row["steps"]

@@ -2,11 +2,14 @@
 
 import gzip
 import json
+import os
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from chainslam.experiments.replays.real_log import RealOptions, read_real_run
+from chainslam.slam.geometry.poses import compose, inverse
 from studies.logs import placing, refined
 from studies.logs.placing import half_of
 from studies.logs.refined import RefinedStudy
@@ -72,7 +75,7 @@ def test_a_log_is_mapped_as_a_user_maps_it_by_a_process_whose_time_and_memory_ar
     assert row["relations_smoothed"]["at_scans"]["all"]["translation_m"]["mean"] == pytest.approx(0.1, abs=0.03)
     assert row["drive_time_s"] == 70.0
     assert row["processor_s"] > 0.5
-    assert row["peak_mib"] > 50.0
+    assert 50.0 < row["peak_mib"] < os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**20
     assert row["lines"] == 2
     found = [column[0] for column in cells([row], refined.table)]
     assert found[:3] == ["hall", "1, 1", f"{row['relations_smoothed']['at_scans']['all']['translation_m']['mean']:.3f}"]
@@ -80,6 +83,23 @@ def test_a_log_is_mapped_as_a_user_maps_it_by_a_process_whose_time_and_memory_ar
     monkeypatch.setattr("studies.logs.refined.subprocess", None)
     study.run()
     assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 1
+
+
+def test_a_mapped_log_has_what_its_row_holds_in_each_column():
+    row = {"log": "hall", "path_length_m": 12.4, "drive_time_s": 600.0, "closures": 3, "lines": 7, "dimensions": 11}
+    row |= {"firm": 5, "processor_s": 40.0, "peak_mib": 321.0, "reference_smoothed": {"ate_aligned_m": 0.25}}
+    row |= {
+        f"relations{tail}": {"at_scans": {"all": {"translation_m": {"mean": m}}}}
+        for tail, m in (("", 9.0), ("_smoothed", 0.5))
+    }
+    row |= {"reference": {"ate_aligned_m": 9.0}}
+    row |= {
+        f"{kind}_normalised": {"all": {"in_band": b, "median": 9.0}}
+        for kind, b in (("relations_smoothed", 0.875), ("reference", 0.625))
+    }
+    assert [column[0] for column in cells([row], refined.table)] == [
+        "hall", "12, 10", "0.500", "0.250", "3", "0.88, 0.62", "7", "11", "15", "321"
+    ]  # fmt: skip
 
 
 def test_a_log_that_cannot_be_mapped_is_told_in_one_line(tmp_path, monkeypatch, capfd):
@@ -96,6 +116,42 @@ def test_a_log_is_cut_at_its_middle_scan(tmp_path):
     whole = read_real_run(tmp_path / "hall.log.gz", RealOptions(), None, {}, {}).log.scan_time_s
     halves = [half_of(tmp_path / "hall.log.gz", number, tmp_path).log.scan_time_s for number in (0, 1)]
     assert [each.tolist() for each in halves] == [whole[:4].tolist(), whole[4:].tolist()]
+
+
+def placed(folder, monkeypatch, log, places, cov=None):
+    """Return the row of a pair whose halves lie along known paths in maps that begin elsewhere."""
+    path = np.column_stack([np.arange(40.0) * 0.3, np.sin(np.arange(40.0)), 0.1 * np.arange(40.0)])
+    np.savetxt(folder / "a.ref_gmapping.txt", np.column_stack([np.arange(40.0), path]))
+    origins = np.array([[1.0, 2.0, 0.5], [-3.0, 1.0, -1.0]])
+    smoothed = [np.array([compose(inverse(origin), pose) for pose in path]) for origin in origins]
+
+    def replayed(number, _):
+        return SimpleNamespace(log=number, smoothed=number)
+
+    told = {"places_world": [compose(compose(inverse(origins[0]), origins[1]), OFF)] * places, "place_covs": [cov]}
+    for name, stand_in in (
+        ("half_of", lambda path, number, home: number),
+        ("replay_real", replayed),
+        ("RealLog", lambda number: SimpleNamespace(config=lambda offline: None)),
+        ("write_results", lambda *given: None),
+        ("placed_real", lambda *given: (None, told)),
+        ("smoothed_path", lambda half, log, poses: (np.arange(40.0), smoothed[poses])),
+    ):
+        monkeypatch.setattr(placing, name, stand_in)
+    [row] = placing._one(folder, ("a", log))
+    return row
+
+
+OFF = np.array([0.3, -0.4, 0.1])
+
+
+def test_a_place_is_compared_with_where_the_halves_lie_by_the_reference(tmp_path, monkeypatch):
+    row = placed(tmp_path, monkeypatch, "a", 1, np.diag([0.01, 0.04, 0.0001]))
+    assert row["off"] == pytest.approx(OFF.tolist(), abs=1e-6)
+    assert row["sigma"] == pytest.approx([0.1, 0.2, 0.01])
+    assert row["fit_m"] == pytest.approx([0.0, 0.0], abs=1e-6)
+    for log, places in (("b", 1), ("a", 2), ("a", 0)):
+        assert placed(tmp_path, monkeypatch, log, places) == {"map": "a", "log": log, "places": places}
 
 
 def test_a_place_is_off_from_where_another_estimate_has_it_and_in_another_building_there_is_none():

@@ -178,6 +178,17 @@ def test_estimators_stand_side_by_side_over_all_places():
     assert lines[1][3] == f"{2 ** (5 / 6):.2f}, {5 ** (5 / 6):.2f}"
 
 
+def test_places_between_others_and_variants_like_others_are_in_all_results_only():
+    rows = [
+        ridden(name, place, 0)
+        for name in ("full-ekf", "oc-ekf")
+        for place in ("plan-a", "ring of 60 m", "ring of 90 m")
+    ]
+    found = benchmarks.estimators(rows)
+    assert found[0][1:3] == ["apartments, 1 drives", "ring of 90 m, 1 drives"]
+    assert [line[0] for line in found[1:]] == ["`full-ekf`"]
+
+
 def test_buildings_stand_by_kind_and_back_end():
     plan = {"file": "lifull_a", "max_steps": 9, "step_ms_mean": 2.0, "step_ms_p95": 4.0}
     school = plan | {"file": "cml_b", "max_steps": 1500, "status": "stopped"}
@@ -221,6 +232,10 @@ def test_a_fault_has_its_worst_scores_and_the_last_step_of_runs_that_failed():
     assert benchmarks.endings([*rows, *others])[2:] == [["2 others", "complete", "0.50", "2.5", "1"]]
     others[1] |= {"map_anees": 3.1}
     assert [line[0] for line in benchmarks.endings([*rows, *others])[2:]] == [others[1]["case"], "1 others"]
+    others[0] |= {"status": "stopped"}
+    assert {line[0] for line in benchmarks.endings([*rows, *others])[2:]} == {each["case"] for each in others}
+    found = benchmarks.endings([sound | {"seed": 1}, others[0] | {"status": "complete"}])
+    assert [line[0] for line in found[1:]] == [SOUND, "1 others"]
     assert benchmarks.endings(rows)[1] == [SOUND, "complete, failed by step 12", "0.50", "1", "2,350"]
 
 

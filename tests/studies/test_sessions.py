@@ -30,6 +30,20 @@ def test_places_are_right_wrong_or_not_found_and_maps_of_both_sessions_are_score
     assert found["map ANEES of both: mean, median"].endswith("), 1.10")
 
 
+def test_each_back_end_has_its_own_row_and_a_score_that_is_none_is_left_out():
+    rows = [row(pose_anees=each) for each in (0.25, 0.75, None)]
+    rows += [row(backend="full-ekf", places=2, map_anees=2.0), row(backend="full-ekf", first_step=0, places=3)]
+    one, other = (
+        dict(zip(HEAD, cells, strict=True)) for cells in zip(*(c.cells for c in table(rows).columns), strict=True)
+    )
+    assert (one["back end"], one["plans"], other["back end"], other["plans"]) == ("`graph`", "3", "`full-ekf`", "2")
+    assert other["place: right, wrong"] == "1, 0"
+    assert other["several places, none"] == "1, 0"
+    assert other["map ANEES of both: mean, median"].startswith("2.00 ")
+    assert one["pose ANEES of the second: mean, median"].startswith("0.50 (")
+    assert one["pose ANEES of the second: mean, median"].endswith(", 0.50")
+
+
 def test_without_a_place_there_is_nothing_to_score():
     lost = row(first_step=0, places=0)
     assert [next(iter(column.cells)) for column in table([lost]).columns] == [

@@ -176,7 +176,7 @@ def audit(
 def _judged_alone(paths: Sequence[Path], given: dict[str, Any]) -> bool:
     """Return whether trajectories are judged by what they hold themselves."""
     is_compared = any(given[name] for name in ("truth", "reference", "relations", "halves"))
-    return bool(given["without-truth"]) or not (is_compared or not all(map(_is_alone, paths)))
+    return bool(given["without-truth"]) or (not is_compared and all(map(_is_alone, paths)))
 
 
 def _is_alone(path: Path) -> bool:
@@ -228,11 +228,11 @@ def _check(paths: Sequence[Path], given: dict[str, Any]) -> None:
     for option, files in (("topic", paths), ("truth-topic", given["truth"] + given["reference"])):
         if given[option] and not any(map(is_bag, files)):
             raise UsageError(f"expected --{option} beside a ROS bag, found none: leave it out")
-    by_truth = given["truth"] or given["reference"] or given["halves"]
+    are_alone = _judged_alone(paths, given)
     for option in ("align", "nearest"):
-        if given[option] and not by_truth and (given["relations"] or _judged_alone(paths, given)):
+        if given[option] and (given["relations"] or are_alone):
             raise UsageError(f"expected --{option} beside --truth or --reference, found none: leave it out")
-    if given["error"] and (not paths or _judged_alone(paths, given)):
+    if given["error"] and (not paths or are_alone):
         raise UsageError("expected --error beside poses to compare, found none: leave it out")
     sigma = given["reference-sigma"]
     known = given["reference"] or not paths

@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
@@ -11,6 +12,7 @@ from chainslam.experiments.library.audit.draws import (
     autocorrelation,
     effective_dof,
     interval,
+    joint_dof,
     pooled_dof,
     score,
 )
@@ -22,6 +24,22 @@ def lasting(n, phi, d=3, seed=0):
     w = np.random.default_rng(seed).standard_normal((n, d))
     w[1:] *= np.sqrt(1.0 - phi**2)
     return lfilter([1.0], [1.0, -phi], w, axis=0)
+
+
+@pytest.mark.parametrize(("n", "rel"), [(240, 1e-9), (1700, 0.02)])
+def test_errors_of_known_covariance_count_as_a_dense_computation_says(n, rel):
+    """Of many errors only some are compared with all others, which changes little."""
+    rng = np.random.default_rng(4)
+    root = rng.standard_normal((2, 2))
+    P = toeplitz(0.9 ** np.arange(n))
+    covs = rng.uniform(1.0, 3.0, n)[:, None, None] * (root @ root.T)
+    L = np.linalg.cholesky(covs)
+
+    def cross(some):
+        return np.einsum("iab,ij,jcb->iajc", L, P[:, some], L[some])
+
+    found = joint_dof(np.linalg.inv(L), cross)
+    assert found == pytest.approx((2 * n) ** 2 / (2 * np.sum(P**2)), rel=rel)
 
 
 def test_the_nees_is_that_of_filterpy_and_of_a_dense_computation():

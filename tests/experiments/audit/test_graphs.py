@@ -164,6 +164,16 @@ def test_what_is_odd_in_a_graph_is_told(tmp_path):
         assert graph_at(path).notes == (note,)
 
 
+def test_edges_that_say_nothing_of_some_direction_are_not_odd(tmp_path):
+    """Their information is singular, and its eigenvalues are below 0 by the digits of the file alone."""
+    drive(tmp_path)
+    path, upper = tmp_path / "a.g2o", np.triu_indices(3)
+    rows = [np.outer(v, v)[upper] for v in np.random.default_rng(1).standard_normal((40, 3))]
+    more = [f"EDGE_SE2 {k} {k + 3} 0 0 0 " + " ".join(f"{w:.12g}" for w in row) for k, row in enumerate(rows)]
+    path.write_text("\n".join([path.read_text(), *more]))
+    assert graph_at(path).notes == ()
+
+
 def test_lines_of_other_kinds_are_counted(tmp_path):
     drive(tmp_path)
     path = tmp_path / "a.g2o"

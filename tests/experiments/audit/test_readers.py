@@ -84,6 +84,12 @@ def test_bags_that_are_none_are_refused_in_one_line(name, tmp_path):
     assert "\n" not in str(found.value)
 
 
+def test_a_straight_drive_is_not_taken_for_quaternions_with_w_first(tmp_path):
+    zero, one = np.zeros(12), np.ones(12)
+    np.savetxt(tmp_path / "a.tum", np.column_stack([np.arange(12.0), *[zero] * 6, one]))
+    assert read(tmp_path / "a.tum").notes == ()
+
+
 def test_a_robot_that_tilts_is_audited_in_the_plane_which_is_told(tmp_path):
     q = np.array([0.3, 0.2, 0.0, np.sqrt(1 - 0.13)])
     np.savetxt(tmp_path / "a.tum", np.array([[k, 0, 0, 0, *q, 1, 0, 0, 1, 0, 1] for k in range(3)]))

@@ -123,7 +123,7 @@ def graph_at(path: Path, space: Space = "plane", rotation: Rotations | None = No
             information[:, :, 3:] *= 0.5
         elif rotation is None and len(edges):
             notes += (AS_VECTORS,)
-    least = np.linalg.eigvalsh(0.5 * (information + information.swapaxes(1, 2)))[:, 0]
+    least = np.linalg.eigvalsh(information)[:, 0]
     if odd := int(np.count_nonzero(least < -NEGATIVE * np.abs(information).max(axis=(1, 2)))):
         notes += (f"the information of {odd} edges has a negative eigenvalue",)
     return Graph(ids, poses, np.searchsorted(ids, ends), motions, information, held, notes)

@@ -138,10 +138,8 @@ class Inner:
         }  # fmt: skip
 
 
-def pool(found: Sequence[Inner]) -> Pooled | None:
-    """Return the mean over independent runs of one kind with its verdict; None where their scale is not known."""
-    if not all(each.is_judged for each in found):
-        return None
+def pool(found: Sequence[Inner]) -> Pooled:
+    """Return the mean over independent runs of one kind, whose scale is known, with its verdict."""
     mean, low, high, dof = mean_of_runs([each.mean for each in found], [each.effective_dof for each in found])
     least = float(np.mean([each.least for each in found]))
     return Pooled(len(found), mean, low, high, _judged(mean, low, high, dof, least), found[0].told.statistic)

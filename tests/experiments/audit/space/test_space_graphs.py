@@ -79,6 +79,7 @@ def test_errors_of_any_frame_have_the_same_nees_to_first_order(frame, tmp_path):
     body, found = (audit(path, truth=true, space="space", error=each).trajectories[0] for each in (None, frame))
     assert found.frame == frame
     assert found.pose.anees == pytest.approx(body.pose.anees, rel=1e-2)
+    assert found.pose.dof == pytest.approx(body.pose.dof, rel=1e-2)
     assert found.nees == pytest.approx(body.nees, rel=2e-2)
     assert found.covs == pytest.approx(
         space.to_frame(read(path, space="space").poses_world[1:], body.covs, "body", frame)

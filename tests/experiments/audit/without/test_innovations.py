@@ -2,15 +2,17 @@
 
 import csv
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import chainslam
-from chainslam.experiments.campaign.comparison.consistency import OVERCONFIDENT
+from chainslam.experiments.campaign.comparison.consistency import CONSISTENT, OVERCONFIDENT
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.library.audit.draws import interval
-from chainslam.experiments.library.audit.without.innovations import effective_dof
+from chainslam.experiments.library.audit.without.inner import Inner, pool
+from chainslam.experiments.library.audit.without.innovations import TOLD, effective_dof
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +59,14 @@ def test_runs_of_one_back_end_are_pooled_and_others_told_one_by_one(run, tmp_pat
     assert main(["audit", str(one), str(other), "--without-truth"]) == 0
     last = capsys.readouterr().out.splitlines()[-1]
     assert last == "not pooled, since they are of different kinds: scans of full-ekf, scans of block-ekf"
+
+
+def test_runs_whose_mean_is_that_behind_their_gate_are_not_called_cautious_together():
+    values = np.full(60_000, 0.8 * 2)
+    ones = [Inner(name, TOLD, np.arange(60_000.0), values, np.full(60_000, 2), (), 120_000.0, (), 0.8) for name in "ab"]
+    assert pool(ones).mean == pytest.approx(0.8)
+    assert pool(ones).verdict.words == ones[0].verdict.words == CONSISTENT
+    assert pool([replace(each, least=1.0) for each in ones]).verdict.words != CONSISTENT
 
 
 def test_innovations_four_times_as_large_reject_the_models(run, tmp_path):

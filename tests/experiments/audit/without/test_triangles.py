@@ -74,5 +74,8 @@ def test_relations_without_triangles_are_refused(tmp_path):
     (tmp_path / "degrees").write_text("0 1 1 0 0 0 0 90\n")
     with pytest.raises(UsageError, match="in radians in degrees, found 90"):
         audit([], relations=tmp_path / "degrees")
+    (tmp_path / "degrees").write_text("0 1 1 0 0 0 0 7\n")
+    with pytest.raises(UsageError, match="in radians in degrees, found 7"):
+        audit([], relations=tmp_path / "degrees")
     with pytest.raises(UsageError, match="correct it"):
         audit([], relations=tmp_path / "r", reference_sigma=(-1.0, 0.1))
