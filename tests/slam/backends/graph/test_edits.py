@@ -26,6 +26,26 @@ def test_a_merged_run_equals_one_that_was_never_split():
     assert_same(split.belief.joint(order), whole.belief.joint(order), place=3e-4, angle=3e-4, cov=1e-3)
 
 
+@pytest.mark.parametrize("verb", ["merge", "remove"])
+def test_observations_leave_a_graph_that_was_not_asked_in_between(verb):
+    """Motions and observations of several steps then enter together, and the observations alone are to leave."""
+    trip = Trip.record(7, steps=12)
+    graph = trip.run(Graph(START, P0), walls_of=lambda k, i: 99 if i == 2 and k > 5 else i, ask=False)
+    if verb == "merge":
+        graph.merge(trip.ids[2], trip.ids[99])
+    else:
+        pose, (_, line, cov, centre) = np.array([0.1, 0.0, 0.1]), trip.seen[3][0]
+        graph.predict(Odometry(pose, trip.odometry_cov))
+        once = graph.grow(line[None], cov[None], centre[None])
+        graph.predict(Odometry(pose, trip.odometry_cov))
+        graph.grow(line[None], cov[None], centre[None])
+        graph.remove(once)
+    found = everything(graph)
+    assert graph.recoveries == 0
+    graph.relinearise()
+    assert_same(found, everything(graph))
+
+
 @pytest.mark.parametrize("verb", ["merge", "trajectory", "relinearise"])
 def test_what_only_a_graph_can_do_makes_beliefs_stale_too(verb):
     trip = Trip.record(11, steps=20)
