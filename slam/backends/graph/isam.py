@@ -11,11 +11,13 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.special import chdtri
 
+from ...estimation.backend import columns_of
 from ...geometry.poses import compose, wrap
 from .ahead import Ahead
 from .config import GraphConfig
 from .factors import (
     LINE_ROWS,
+    POSE_BLOCK,
     POSE_ROWS,
     line_factors,
     line_key,
@@ -28,8 +30,6 @@ from .factors import (
     pose_of,
 )  # fmt: skip
 from .record import Observation, Record
-
-_POSE_BLOCK = np.ix_(POSE_ROWS, POSE_ROWS)
 
 
 class DivergedError(RuntimeError):
@@ -233,14 +233,13 @@ class Isam:
             self._ask(sorted(keys))
         if len(keys) <= self._config.near:
             self._near = sorted(keys)
-        at = 3 + 2 * np.searchsorted(self._known, keys)
-        columns = np.concatenate([[0, 1, 2], np.stack([at, at + 1], axis=-1).ravel()]).astype(np.int64)
+        columns = columns_of(np.searchsorted(self._known, keys))
         return self._cov[columns[:, None], columns]
 
     def pair_cov(self, first: int, second: int) -> Float[np.ndarray, "6 6"]:
         """Return the covariance of two poses, each in its body frame."""
         if first == second:
-            return np.tile(self._isam.marginalCovariance(pose_key(first))[_POSE_BLOCK], (2, 2))
+            return np.tile(self._isam.marginalCovariance(pose_key(first))[POSE_BLOCK], (2, 2))
         found = self._isam.jointMarginalCovariance([pose_key(first), pose_key(second)]).fullMatrix()
         rows = np.concatenate([POSE_ROWS, 6 + np.array(POSE_ROWS)])
         return np.asarray(found[np.ix_(rows, rows)])
