@@ -65,6 +65,7 @@ def test_step_by_step_the_graph_stays_within_a_few_hundredths_of_a_sigma_of_the_
     """Also where the wheels slip by four degrees a step, so that no prediction is a point to linearise at."""
     trip = Trip.record(3, sigmas=(0.004, 0.002), odometry_cov=slip**2 * ODOMETRY_COV)
     stepwise, batch = trip.run(Graph(START, P0)), Trip.run(trip, GraphBatch(START, P0))
+    assert stepwise.recoveries == 0
     batch.finish()
     a, b = everything(stepwise), everything(batch)
     sigma = np.sqrt(np.diag(b.cov))
