@@ -53,6 +53,7 @@ def test_after_lines_were_forgotten_the_rest_goes_on_as_in_a_graph_made_anew():
     graph = first.run(Graph(START, P0))
     _, line, cov, centre = trip.seen[11][0]
     once = graph.grow(line[None], cov[None], centre[None])
+    graph.belief.joint([first.ids[2], int(once[0])])
     graph.remove([int(once[0]), first.ids[2]])
     for motion, seen in zip(trip.motions[11:], trip.seen[12:], strict=True):
         graph.predict(Odometry(motion, trip.odometry_cov))

@@ -82,6 +82,29 @@ def test_without_asking_in_between_the_end_is_the_same():
     np.testing.assert_allclose(silent.finish(), asked.finish(), atol=1e-7)
 
 
+def test_lines_asked_for_in_another_order_at_each_step_have_the_same_covariance():
+    """What was asked for is asked for again ahead of the next question, in an order of its own."""
+    trip, rng = Trip.record(4, steps=20), np.random.default_rng(4)
+
+    class Asked:
+        graph = Graph(START, P0)
+
+        def __getattr__(self, name):
+            return getattr(self.graph, name)
+
+        @property
+        def belief(self):
+            belief = self.graph.belief
+            order = rng.permutation(len(belief.ids))
+            whole, some = belief.joint(belief.ids), belief.joint(belief.ids[order])
+            np.testing.assert_array_equal(whole.take(order).mean, some.mean)
+            np.testing.assert_allclose(whole.take(order).cov, some.cov, rtol=1e-6, atol=1e-12)
+            return belief
+
+    truth, found = everything(trip.run(Graph(START, P0))), everything(trip.run(Asked()))
+    assert_same(found, truth, place=1e-5, angle=1e-5, cov=1e-3)
+
+
 def test_several_predictions_in_a_row_each_make_a_pose():
     trip = Trip.record(5, steps=4)
     backend = trip.run(Graph(START, P0))
