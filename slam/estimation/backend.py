@@ -37,6 +37,19 @@ def columns_of(rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " s"]:
     return columns
 
 
+def rows_of(known: Int[np.ndarray, " n"], ids: Sequence[int] | Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+    """Return where these ids stand among the known ones (ascending); raises KeyError for an id that is not there."""
+    wanted = np.asarray(ids, dtype=np.int64)
+    if not len(known):
+        if len(wanted):
+            raise KeyError(f"expected ids of lines in the map, found {wanted.tolist()} in an empty map")
+        return wanted
+    rows = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
+    if np.any(known[rows] != wanted):
+        raise KeyError(f"expected ids of lines in the map, found {wanted[known[rows] != wanted].tolist()}")
+    return rows
+
+
 @dataclass(frozen=True)
 class Joint:
     """Joint Gaussian of the pose and m lines: (x, y, heading, alpha_1, d_1, alpha_2, d_2, ...)."""
@@ -77,15 +90,7 @@ class Belief:
 
     def rows(self, ids: Sequence[int] | Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return the rows of these ids; raises KeyError for an id that is not in the map."""
-        wanted = np.asarray(ids, dtype=np.int64)
-        if not len(self.ids):
-            if len(wanted):
-                raise KeyError(f"expected ids of lines in the map, found {wanted.tolist()} in an empty map")
-            return wanted
-        rows = np.minimum(np.searchsorted(self.ids, wanted), len(self.ids) - 1)
-        if np.any(self.ids[rows] != wanted):
-            raise KeyError(f"expected ids of lines in the map, found {wanted[self.ids[rows] != wanted].tolist()}")
-        return rows
+        return rows_of(self.ids, ids)
 
     def joint(self, ids: Sequence[int] | Int[np.ndarray, " m"]) -> Joint:
         """Return the joint Gaussian of the pose and these lines, with zeros for blocks that a back end drops."""

@@ -26,6 +26,7 @@ from .record import Observation
 
 POSE_ROWS = (4, 5, 0)
 """Where x, y and heading stand in the chart of a pose, which has 6 rows."""
+POSE_BLOCK = np.ix_(POSE_ROWS, POSE_ROWS)
 LINE_ROWS = (0, 2)
 """Where -alpha and -r stand in the chart of a line, which has 3 rows."""
 HELD = 1e-6
@@ -37,7 +38,7 @@ Any number gives the same answer, but it is to be one: poses that tilt more free
 until it is known so unevenly that Cholesky refuses it and QR goes astray.
 """
 
-_POSE_BLOCK, _HELD_COV = np.ix_(POSE_ROWS, POSE_ROWS), HELD**2 * np.eye(3)
+_HELD_COV = HELD**2 * np.eye(3)
 _POSES, _LINES = gtsam.symbol("x", 0), gtsam.symbol("l", 0)
 
 
@@ -104,5 +105,5 @@ def _line_factor(line: int, pose: int, alpha: float, weights: Float[np.ndarray, 
 
 def _noise(cov_body: Float[np.ndarray, "3 3"]) -> gtsam.noiseModel.Gaussian:
     cov = OFF_PLANE**2 * np.eye(6)
-    cov[_POSE_BLOCK] = cov_body + _HELD_COV
+    cov[POSE_BLOCK] = cov_body + _HELD_COV
     return gtsam.noiseModel.Gaussian.Covariance(cov)

@@ -13,7 +13,7 @@ import gtsam
 import numpy as np
 from jaxtyping import Float, Int
 
-from ...estimation.backend import Belief, ContradictionError, Joint, Observations, StaleBeliefError
+from ...estimation.backend import Belief, ContradictionError, Joint, Observations, StaleBeliefError, rows_of
 from ...estimation.models import initialise, innovations, stack
 from ...geometry.lines import normals
 from ...geometry.poses import to_robot, to_world
@@ -193,10 +193,11 @@ class Graph:
     def _query(self, version: int, ids: Int[np.ndarray, " m"]) -> Joint:
         if version != self._version:
             raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
-        rows = self._rows(ids)
-        cov, belief = self._joint(rows, self._isam.joint_cov(rows)).cov, self.belief
-        cov[:3, :3] = belief.pose_cov  # by sums of another size it would be rounded otherwise
-        return Joint(np.concatenate([belief.pose_world, belief.means[rows].ravel()]), cov, belief.anchors[rows])
+        belief = self.belief
+        rows = belief.rows(ids)
+        joint = self._joint(rows, self._isam.joint_cov(rows))
+        joint.cov[:3, :3] = belief.pose_cov  # by sums of another size it would be rounded otherwise
+        return replace(joint, anchors=belief.anchors[rows])  # there and back they would be too
 
     def _joint(self, rows: Int[np.ndarray, " m"], cov: Float[np.ndarray, "s s"]) -> Joint:
         mean, anchors = np.concatenate([self._ahead.pose, self._means[rows].ravel()]), self._inner_anchors[rows]
@@ -274,12 +275,7 @@ class Graph:
 
     def _rows(self, ids: Sequence[int] | Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return where the ids stand among the lines shown; raises KeyError for others."""
-        wanted, known = np.asarray(ids, dtype=np.int64), self._isam.ids
-        rows = np.searchsorted(known, wanted)
-        found = np.take(known, rows, mode="clip") == wanted if len(known) else np.zeros(len(wanted), dtype=bool)
-        if not found.all():
-            raise KeyError(f"expected ids of lines in the map, found {wanted[~found].tolist()}")
-        return rows
+        return rows_of(self._isam.ids, ids)
 
     def _anchor(self) -> None:
         shown = [self.record.lines[line].anchor for line in self._isam.ids.tolist()]

@@ -11,11 +11,13 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.special import chdtri
 
+from ...estimation.backend import columns_of
 from ...geometry.poses import compose, wrap
 from .ahead import Ahead
 from .config import GraphConfig
 from .factors import (
     LINE_ROWS,
+    POSE_BLOCK,
     POSE_ROWS,
     line_factors,
     line_key,
@@ -28,8 +30,6 @@ from .factors import (
     pose_of,
 )  # fmt: skip
 from .record import Observation, Record
-
-_POSE_BLOCK = np.ix_(POSE_ROWS, POSE_ROWS)
 
 
 class DivergedError(RuntimeError):
@@ -46,7 +46,7 @@ class Isam:
         self._thresholds = np.array([config.relinearise_angle_rad, config.relinearise_place_m])
         self._beyond = float(chdtri(3, config.diverged_chance))
         self._factors, self._values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-        self._entering: list[Observation] = []
+        self._entering: list[tuple[int, Observation]] = []
         self._removals: list[int] = []
         self._near: list[int] = []
         self._known: list[int] = []
@@ -109,9 +109,9 @@ class Isam:
 
     def enter(self, line: int, observation: Observation) -> None:
         """Enter an observation of a line."""
+        self._entering.append((self._factors.size(), observation))
         for factor in line_factors(line, observation):
             self._factors.push_back(factor)
-        self._entering.append(observation)
 
     def leave(self, observations: Sequence[Observation]) -> None:
         """Take observations out; all must be solved for. A line with none left drops out too."""
@@ -161,12 +161,11 @@ class Isam:
             top.insert2(key, 1)
         for key in self._near:
             again.push_back(key)
-        count = self._factors.size() - 2 * len(self._entering)
         anew = bool(np.any(self._off > 1.0))
         result = self._isam.update(self._factors, self._values, self._removals, top, None, again, anew)
-        slots = result.getNewFactorsIndices()[count:]
-        for k, observation in enumerate(self._entering):
-            observation.slots = slots[2 * k], slots[2 * k + 1]
+        slots = result.getNewFactorsIndices()
+        for at, observation in self._entering:
+            observation.slots = slots[at], slots[at + 1]
         self._factors, self._values = gtsam.NonlinearFactorGraph(), gtsam.Values()
         self._entering, self._removals, self._known, self._cov = [], [], [], np.zeros((0, 0))
 
@@ -234,14 +233,13 @@ class Isam:
             self._ask(sorted(keys))
         if len(keys) <= self._config.near:
             self._near = sorted(keys)
-        at = 3 + 2 * np.searchsorted(self._known, keys)
-        columns = np.concatenate([[0, 1, 2], np.stack([at, at + 1], axis=-1).ravel()]).astype(np.int64)
+        columns = columns_of(np.searchsorted(self._known, keys))
         return self._cov[columns[:, None], columns]
 
     def pair_cov(self, first: int, second: int) -> Float[np.ndarray, "6 6"]:
         """Return the covariance of two poses, each in its body frame."""
         if first == second:
-            return np.tile(self._isam.marginalCovariance(pose_key(first))[_POSE_BLOCK], (2, 2))
+            return np.tile(self._isam.marginalCovariance(pose_key(first))[POSE_BLOCK], (2, 2))
         found = self._isam.jointMarginalCovariance([pose_key(first), pose_key(second)]).fullMatrix()
         rows = np.concatenate([POSE_ROWS, 6 + np.array(POSE_ROWS)])
         return np.asarray(found[np.ix_(rows, rows)])

@@ -6,7 +6,7 @@ import pytest
 
 from chainslam.slam.backends.graph.batch import GraphBatch
 from chainslam.slam.backends.graph.graph import Graph, UnsolvableError
-from chainslam.slam.backends.graph.isam import Isam
+from chainslam.slam.backends.graph.isam import DivergedError, Isam
 from chainslam.slam.estimation.backend import ContradictionError, Observations
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.geometry.poses import compose, wrap
@@ -176,6 +176,21 @@ def test_a_solution_that_jumps_is_not_believed(fault, monkeypatch):
     assert backend.recoveries == 1
     # Anew or step by step, both are near the optimum.
     assert_same(everything(backend), whole, place=2e-3, angle=1e-3, cov=0.05)
+
+
+@pytest.mark.parametrize(
+    ("off", "holds"),
+    [([1.0, 0.0, 0.0], True), ([0.0, 1.5, 0.0], False), ([0.0, 0.0, 0.03], True), ([0.0, 0.0, 0.05], False)],
+)
+def test_a_pose_is_held_within_some_thresholds_of_an_exact_prediction(off, holds):
+    """Chi-square of three at 1e-9 is 44.8: 6.7 thresholds of 0.2 m and of 0.005 rad are 1.34 m and 0.033 rad."""
+    isam = Graph(START, P0)._isam
+    isam.pose = np.array(off)
+    if holds:
+        isam._hold_pose(np.zeros(3), np.zeros((3, 3)))
+    else:
+        with pytest.raises(DivergedError, match="chi-square 45"):
+            isam._hold_pose(np.zeros(3), np.zeros((3, 3)))
 
 
 def test_a_scan_that_no_solver_takes_is_taken_out_again_and_the_rest_holds(monkeypatch):

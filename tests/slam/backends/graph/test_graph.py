@@ -8,6 +8,7 @@ from chainslam.experiments.scoring.without_truth.relations import between
 from chainslam.slam.backends.graph.batch import GraphBatch
 from chainslam.slam.backends.graph.config import GraphConfig
 from chainslam.slam.backends.graph.graph import Graph
+from chainslam.slam.estimation.backend import Observations
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.geometry.poses import compose, rotation, to_world, wrap
 from chainslam.slam.robot import Odometry
@@ -65,6 +66,7 @@ def test_step_by_step_the_graph_stays_within_a_few_hundredths_of_a_sigma_of_the_
     """Also where the wheels slip by four degrees a step, so that no prediction is a point to linearise at."""
     trip = Trip.record(3, sigmas=(0.004, 0.002), odometry_cov=slip**2 * ODOMETRY_COV)
     stepwise, batch = trip.run(Graph(START, P0)), Trip.run(trip, GraphBatch(START, P0))
+    assert stepwise.recoveries == 0
     batch.finish()
     a, b = everything(stepwise), everything(batch)
     sigma = np.sqrt(np.diag(b.cov))
@@ -79,6 +81,18 @@ def test_without_asking_in_between_the_end_is_the_same():
     trip = Trip.record(4)
     asked, silent = trip.run(GraphBatch(START, P0)), trip.run(GraphBatch(START, P0), ask=False)
     np.testing.assert_allclose(silent.finish(), asked.finish(), atol=1e-7)
+
+
+def test_lines_asked_for_in_another_order_than_in_the_step_before_have_their_own_covariance():
+    """What was asked for is asked for again ahead of the next question."""
+    trip = Trip.record(4, steps=20)
+    graph = trip.run(Graph(START, P0))
+    graph.belief.joint(graph.belief.ids[::-1])
+    wall, line, cov, _ = trip.seen[-1][0]
+    graph.update(*(Observations(np.array([trip.ids[wall]]), line[None], cov[None]),) * 2)
+    found = everything(graph)
+    graph.relinearise()
+    assert_same(found, everything(graph))
 
 
 def test_several_predictions_in_a_row_each_make_a_pose():
