@@ -9,7 +9,6 @@ from .estimation.shared import SharedConfig
 from .extraction.config import ExtractionConfig
 from .map.extents import WallsConfig
 from .map.merging import MergingConfig
-from .map.polylines.change_points import ChangePointsConfig
 from .robot import RobotSpec, fitted, of_robot
 
 
@@ -22,11 +21,7 @@ class MapperConfig:
     """Used by several of the groups below."""
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
-    vertices: bool = True
-    """Split segments at breakpoints that the map knows, and walls at breakpoints that a scan shows."""
     walls: WallsConfig = field(default_factory=WallsConfig)
-    change_points: ChangePointsConfig | None = field(default_factory=ChangePointsConfig)
-    """Without it, walls are split only at breakpoints that a single scan shows."""
     merging: MergingConfig | None = field(default_factory=MergingConfig)
     """Without it, one wall may be in the map twice."""
     recovery: RecoveryConfig | None = field(default_factory=RecoveryConfig)

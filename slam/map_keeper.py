@@ -22,8 +22,6 @@ from .map.chains import Chain
 from .map.existence import LandmarkCandidates
 from .map.landmarks import Landmarks
 from .map.merging import duplicate_of
-from .map.polylines.change_points import ChangePointsConfig
-from .map.polylines.vertices import meetings
 from .map.stochastic_map import StochasticMap
 from .robot import Scan, ScannerSpec
 
@@ -71,8 +69,7 @@ class MapKeeper:
     def __init__(self, backend: Backend, config: MapperConfig) -> None:
         self.backend = backend
         self.config = config
-        change_points = config.change_points or ChangePointsConfig()
-        self.landmarks = Landmarks(config.walls, change_points, config.extraction.sure_beams)
+        self.landmarks = Landmarks(config.walls, config.extraction.sure_beams)
         same = config.matching.gate, config.matching.angle_rad
         self._candidates = LandmarkCandidates(*same, config.extraction.least_beams, config.walls.existence)
 
@@ -84,31 +81,23 @@ class MapKeeper:
         """Let the ends of walls move along with the map, where an update moved it."""
         self.landmarks.extents.follow(self.backend.belief)
 
-    def without(self, ids: Int[np.ndarray, " n"], walls: StochasticMap) -> StochasticMap:
-        """Forget walls of the map that are none, and return what is left of it."""
-        if not len(ids):
-            return walls
-        self.backend.remove(ids.tolist())
-        self.landmarks.remove(ids)
-        return self.map()
-
     def store(
-        self, scan: Scan, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]
+        self, scan: Scan, segments: Segments, matches: Matches
     ) -> tuple[StochasticMap, Int[np.ndarray, " s"], tuple[tuple[int, int], ...]]:
         """Take in a scan: initialise landmarks, note what was seen of each wall, and merge what is one.
 
-        `sides` are the two segments beside a bend that was found now: many scans stand behind them. Returns the map,
-        the wall of each segment (-1 for none), and the ids (kept, dropped) of landmarks that were one wall.
+        Returns the map, the wall of each segment (-1 for none), and the ids (kept, dropped) of landmarks that were one
+        wall.
         """
-        begun = self._initialised(scan, segments, matches, sides)
+        begun = self._initialised(scan, segments, matches)
         owners = self._observed(scan, segments, *begun, matches.ambiguous)
-        walls, merged = self._merged(owners, self._ended(scan))
+        walls, merged = self._merged(owners, self.map())
         for keep, drop in merged:
             owners = np.where(owners == drop, keep, owners)
         return walls, owners, merged
 
     def _initialised(
-        self, scan: Scan, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]
+        self, scan: Scan, segments: Segments, matches: Matches
     ) -> tuple[Int[np.ndarray, " s"], dict[int, float]]:
         """Grow the map by the segments that belong to no wall.
 
@@ -132,12 +121,8 @@ class MapKeeper:
             fresh = fresh[told]
         if len(fresh):
             owners[fresh] = self.backend.grow(begun.lines[told], cov[told], seen_centres(segments, fresh))
-        known = {owner for owner in owners[sides].tolist() if owner >= 0}
-        if len(known) == 2:
-            self.landmarks.change_points.keep_apart(*known)
-        surest = dict.fromkeys(known, self.config.walls.existence.most)
         likely = dict(zip(owners[believed].tolist(), odds.tolist(), strict=True))
-        return owners, {owner: likely[owner] for owner in likely if owner >= 0} | surest
+        return owners, {owner: likely[owner] for owner in likely if owner >= 0}
 
     def _observed(
         self,
@@ -153,18 +138,6 @@ class MapKeeper:
             self.backend.remove(observed.forgotten.tolist())
         return observed.owners
 
-    def _ended(self, scan: Scan) -> StochasticMap:
-        """Return the map, in which the sides of a bend end where they meet."""
-        walls = self.map()
-        if not self.config.vertices:
-            return walls
-        one_wall, sides = self.config.matching.one_wall, self.landmarks.change_points
-        pairs, along = meetings(walls, scan.range_max_m, one_wall, self.config.shared, sides.cut)
-        if not len(pairs):
-            return walls
-        self.landmarks.extents.meet(pairs, along)
-        return self.map()
-
     def _merged(
         self, owners: Int[np.ndarray, " s"], walls: StochasticMap
     ) -> tuple[StochasticMap, tuple[tuple[int, int], ...]]:
@@ -173,8 +146,7 @@ class MapKeeper:
             return walls, ()
         merged: list[tuple[int, int]] = []
         touched, one_wall = set(owners[owners >= 0].tolist()), self.config.matching.one_wall
-        sides = self.landmarks.change_points
-        while twice := duplicate_of(walls, touched, one_wall, self.config.merging, sides.cut):
+        while twice := duplicate_of(walls, touched, one_wall, self.config.merging):
             keep, drop = twice
             self.landmarks.merge(self.backend.belief, keep, drop)
             self.backend.merge(keep, drop)

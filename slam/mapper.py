@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from .association.joint_compatibility import Nis
 from .association.leap import Leap
@@ -19,20 +18,15 @@ from .config import MapperConfig
 from .estimation.backend import Backend, Belief, ContradictionError, Observations
 from .estimation.mounting import belief_of_body, odometry_of_scanner
 from .extraction.config import ExtractionConfig
-from .extraction.extract import NO_VERTICES, extract
+from .extraction.extract import extract
 from .extraction.segments import Segments
 from .extraction.visible_extent import sure_pieces
 from .map.chains import Chain, connect
-from .map.polylines.vertices import mistaken, vertices_within
-from .map.polylines.wall_beams import beams_on_walls
-from .map.reliability import are_clear, as_told
+from .map.reliability import as_told
 from .map.stochastic_map import StochasticMap
 from .map_keeper import MapKeeper, MapUpdate
 from .odometry.diagnosis import AT_REST, Diagnosis
 from .robot import Odometry, RobotError, Scan
-
-NONE = np.zeros(0, dtype=np.int64)
-"""No rows."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +47,8 @@ class Localised:
 class Extractor(Protocol):
     """Finds the straight segments of a scan."""
 
-    def __call__(
-        self, scan: Scan, config: ExtractionConfig, *, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES
-    ) -> Segments:
-        """Return the segments; at the bearings `vertices_rad` the map knows a bend, which an oracle may know better."""
+    def __call__(self, scan: Scan, config: ExtractionConfig) -> Segments:
+        """Return the segments, in the order of their bearings."""
         ...
 
 
@@ -133,7 +125,11 @@ class Mapper:
             return self._taken_in(heard.scan, set_aside)
         scan, factor = heard.scan, 1.0 if self._noise is None else self._noise.factor
         repeats = self._diagnosis.repeats(heard.sensed)
-        update = self._nothing_taken_in(*self._features(scan)) if repeats else self._taken_in(scan, set_aside)
+        update = (
+            self._nothing_taken_in(self._pieces(scan), self._keeper.map())
+            if repeats
+            else self._taken_in(scan, set_aside)
+        )
         found = update.localisation
         is_in_doubt = found.is_lost or (self._noise is not None and self._noise.factor > factor)
         fault = self._diagnosis.see(heard.sensed, found.unstated_motion is not None, is_in_doubt)
@@ -141,7 +137,7 @@ class Mapper:
 
     def _taken_in(self, scan: Scan, set_aside: Collection[tuple[int, int]]) -> MapUpdate:
         # 1. Extract features from the sensory input.
-        segments, walls = self._features(scan)
+        segments, walls = self._pieces(scan), self._keeper.map()
         # 2 to 4. Match them, localise the robot, and match again.
         found = self._localised(scan, segments, walls)
         motion = self._recovery(scan, found, walls)
@@ -150,8 +146,7 @@ class Mapper:
             return self._nothing_taken_in(segments, walls)
         if motion is not None:
             self._move(motion)
-            segments, walls = self._features(scan)
-            found = self._localised(scan, segments, walls)
+            found = self._localised(scan, segments, self._keeper.map())
         matches = found.matches
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
         try:
@@ -165,22 +160,11 @@ class Mapper:
             return self._nothing_taken_in(segments, self._keeper.map())
         self._left_out = 0
         self._keeper.follow()
-        segments, matches, sides = self._cut_at_change_points(scan, segments, matches)
-        walls, owners, merged = self._keeper.store(scan, segments, matches, sides)
+        walls, owners, merged = self._keeper.store(scan, segments, matches)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         self._chains = connect(walls, set_aside, self.config.shared)
         localisation = Localisation(found.nis, motion, noise_factor=self._weighed(found, motion))
         return MapUpdate(segments, matches, owners, walls, self._chains, merged, localisation)
-
-    def _features(self, scan: Scan) -> tuple[Segments, StochasticMap]:
-        """Return the segments of a scan, and the map without the walls that these show to be mistaken."""
-        walls = self._keeper.map()
-        if not self.config.vertices:
-            return self._pieces(scan), walls
-        segments = self._segments(scan, walls)
-        return segments, self._keeper.without(
-            mistaken(segments, walls, self.config.matching.gate, self.config.shared), walls
-        )
 
     def _localised(self, scan: Scan, segments: Segments, walls: StochasticMap) -> Localised:
         # 2. Match observed features to the best fitting equivalents in the map.
@@ -246,44 +230,11 @@ class Mapper:
     def _observed(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches as observations that move the estimate."""
         observed = matches.observations(segments)
-        cov = as_told(observed.cov, segments.take(matches.pairs[:, 0]), self.config.walls.reliability)
-        return replace(observed, cov=cov)
+        seen = segments.take(matches.pairs[:, 0])
+        cov = as_told(observed.cov, seen, self.config.walls.reliability)
+        return replace(observed, cov=cov + self._keeper.landmarks.lack_of_fit(seen, matches.pairs[:, 1]))
 
-    def _segments(self, scan: Scan, walls: StochasticMap) -> Segments:
-        """Return the straight pieces of the scan, cut where the map knows a bend."""
-        segments = self._pieces(scan)
-        bends = self._bends(segments, walls)
-        return self._pieces(scan, bends) if len(bends) else segments
-
-    def _pieces(self, scan: Scan, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES) -> Segments:
+    def _pieces(self, scan: Scan) -> Segments:
+        """Return the straight pieces of the scan."""
         config = self.config.extraction
-        pieces = sure_pieces(self._extract(scan, config, vertices_rad=vertices_rad), scan, config)
-        return self._ranges.stated(scan, pieces)
-
-    def _bends(self, segments: Segments, walls: StochasticMap) -> Float[np.ndarray, " b"]:
-        cut = self._keeper.landmarks.change_points.cut
-        return vertices_within(segments, walls, self.config.matching.one_wall, self.config.shared, cut)
-
-    def _cut_at_change_points(
-        self, scan: Scan, segments: Segments, matches: Matches
-    ) -> tuple[Segments, Matches, Int[np.ndarray, " c"]]:
-        """Forget a wall that all scans together show to bend: its two sides take its place.
-
-        Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
-        beside a bend; all as it was, and none, while the scan shows a side of it too poorly.
-        """
-        change_points = self._keeper.landmarks.change_points
-        if not self.config.vertices or self.config.change_points is None:
-            return segments, matches, NONE
-        seen = beams_on_walls(self.backend.belief, scan, segments, matches.pairs, self.config.shared)
-        change_point = change_points.see(seen)
-        if change_point is None:
-            return segments, matches, NONE
-        walls = self._keeper.map()
-        pieces = self._pieces(scan, np.append(self._bends(segments, walls), change_point.bearing_rad))
-        clear = np.flatnonzero(are_clear(pieces, self.config.walls.reliability))
-        sides = change_points.sides_of(change_point, segments, pieces.take(clear), scan)
-        if sides is None:
-            return segments, matches, NONE
-        view = self._view(scan, pieces, self._keeper.without(np.array([change_point.wall]), walls))
-        return pieces, view.match_all(), clear[list(sides)]
+        return self._ranges.stated(scan, sure_pieces(self._extract(scan, config), scan, config))

@@ -45,8 +45,6 @@ METHODS: dict[str, MethodPreset] = {
         mapper=(
             (MATCHING, "paper"),
             ("mission.mapper.merging", None),
-            ("mission.mapper.vertices", False),
-            ("mission.mapper.change_points", None),
         ),
         driving=((FOLLOWING, "paper"), (NAVIGATION, "visibility"), (SWEEP, False)),
     ),

@@ -8,14 +8,13 @@ from types import GenericAlias
 from typing import Any, Literal
 
 import numpy as np
-from jaxtyping import Float
 from msgspec import defstruct
 
 from chainslam.sim.logs.archive import read_archive
 from chainslam.sim.logs.recorded_robot import read_log
 from chainslam.sim.worlds import DrawingOptions, World
 from chainslam.slam.extraction.config import ExtractionConfig
-from chainslam.slam.extraction.extract import NO_VERTICES, extract
+from chainslam.slam.extraction.extract import extract
 from chainslam.slam.extraction.segments import Segments
 from chainslam.slam.mapper import Extractor
 from chainslam.slam.robot import Scan
@@ -198,17 +197,10 @@ def _recording(log: bytes, config: TrialConfig) -> RecordedRun:
 
 @lru_cache(maxsize=2)
 def remembered(log: bytes) -> Extractor:
-    """Return an extraction that works out each scan of a recording once: whoever replays it sees the same segments.
-
-    Cut where a map knows a bend, a scan is that map's own and worked out anew.
-    """
+    """Return an extraction that works out each scan of a recording once: whoever replays it sees the same segments."""
     known: dict[tuple[float, ExtractionConfig], Segments] = {}
 
-    def extracted(
-        scan: Scan, config: ExtractionConfig, *, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES
-    ) -> Segments:
-        if len(vertices_rad):
-            return extract(scan, config, vertices_rad=vertices_rad)
+    def extracted(scan: Scan, config: ExtractionConfig) -> Segments:
         key = scan.time_s, config
         if key not in known:
             known[key] = extract(scan, config)

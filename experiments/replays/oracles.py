@@ -12,7 +12,7 @@ from chainslam.slam.association.matching import NO_MATCHES, KnownWalls, Matches,
 from chainslam.slam.config import MapperConfig
 from chainslam.slam.estimation.backend import Joint
 from chainslam.slam.extraction.config import ExtractionConfig
-from chainslam.slam.extraction.extract import NO_VERTICES, extract
+from chainslam.slam.extraction.extract import extract
 from chainslam.slam.extraction.segments import Segments
 from chainslam.slam.extraction.straightness import StraightnessConfig
 from chainslam.slam.geometry.poses import compose, inverse, wrap
@@ -106,9 +106,7 @@ class PerfectExtraction:
     def __init__(self, witness: Witness, chance: Chance) -> None:
         self._witness, self._chance = witness, chance
 
-    def __call__(
-        self, scan: Scan, config: ExtractionConfig, *, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES
-    ) -> Segments:
+    def __call__(self, scan: Scan, config: ExtractionConfig) -> Segments:
         """Extract the segments of one scan; those of several walls are dropped, so that the map need not split them."""
         segments = extract(scan, config)
         faces = self._witness.faces(segments)

@@ -17,20 +17,16 @@ from .kernels.segment_kernels import segments_of
 from .segments import Segments
 
 DEFAULT = ExtractionConfig()
-NO_VERTICES = np.zeros(0)
 _FAR_M = 1e4
 """Farther returns are not used: in inverse range they are noise."""
 
 
-def extract(
-    scan: Scan, config: ExtractionConfig = DEFAULT, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES
-) -> Segments:
+def extract(scan: Scan, config: ExtractionConfig = DEFAULT) -> Segments:
     """Return the straight segments of `scan` in the robot frame, counter-clockwise; none where nothing is straight.
 
-    An end is OPEN also where the wall stops in front of something farther. At the bearings `vertices_rad` the wall is
-    known to bend.
+    An end is OPEN also where the wall stops in front of something farther.
     """
-    found, is_good = segments_of(*beams_of_scan(scan), plain(vertices_rad), rules_of(config))
+    found, is_good = segments_of(*beams_of_scan(scan), rules_of(config))
     segments = Segments(*found)
     return segments if is_good.all() else segments.take(is_good)
 

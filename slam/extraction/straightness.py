@@ -15,7 +15,7 @@ from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.lines import directions
 from ..geometry.quantities import Angle, Distance
 from .segments import Segments
-from .straightness_kernels import faces_cov, misfit_variances
+from .straightness_kernels import edge_cov, faces_cov, misfit_variances
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,13 @@ def cov_of_faces(segments: Segments, config: StraightnessConfig = StraightnessCo
 def cov_of_misfits(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what they lack where the residuals of a segment show that it is of several faces."""
     return faces_cov(segments.lines, segments.ends, _misfits_m2(segments, config), 0.0, 1.0)
+
+
+def cov_of_breaks(
+    segments: Segments, misfits_m2: Float[np.ndarray, " s"], lengths_m: Float[np.ndarray, " s"]
+) -> Float[np.ndarray, "s 2 2"]:
+    """Return what they lack since each shows one face of a wall of several, of such misfit and length."""
+    return edge_cov(misfits_m2, lengths_m, _middles_m(segments))
 
 
 def cov_of_bows(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:

@@ -161,10 +161,3 @@ class Extents:
         columns["whole"][row] = 0
         columns["log_odds"][row] = max(columns["log_odds"][row], columns["log_odds"][other])
         columns["last_seen"][row] = max(columns["last_seen"][row], columns["last_seen"][other])
-
-    def meet(self, pairs: Int[np.ndarray, "k 2"], along: Float[np.ndarray, "k 2"]) -> None:
-        """End the walls of each pair of ids, the one before the other, so far along each, m, where they reach past."""
-        before, after = self._records.rows(pairs[:, 0]), self._records.rows(pairs[:, 1])
-        extents = self._records.columns["extents"]
-        np.minimum.at(extents[:, 1], before, along[:, 0])
-        np.maximum.at(extents[:, 0], after, along[:, 1])

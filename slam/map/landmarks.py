@@ -4,14 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from ..estimation.backend import Belief
 from ..extraction.segments import Segments
+from ..extraction.straightness import cov_of_breaks
 from ..geometry.lines import directions
 from ..robot import Scan
 from .extents import NO_ODDS, NOBODY, Extents, WallsConfig
-from .polylines.change_points import ChangePoints, ChangePointsConfig
+from .profiles import Profiles
 from .records import Records
 from .reliability import Reliability
 from .stochastic_map import StochasticMap
@@ -30,19 +31,24 @@ class Observed:
 class Landmarks:
     """The records of the walls in a back end's map, a row each, in the order of the belief's ids."""
 
-    def __init__(self, walls: WallsConfig, change_points: ChangePointsConfig, sure_beams: int) -> None:
+    def __init__(self, walls: WallsConfig, sure_beams: int) -> None:
         """`sure_beams` are those of a sure segment."""
         self.records = Records()
         self.extents = Extents(walls, self.records, sure_beams)
         self.reliability = Reliability(walls.reliability, self.records)
-        self.change_points = ChangePoints(change_points, self.records)
+        self.profiles = Profiles(walls.shared, self.records)
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""
         ids, extents = self.records.ids, self.records.columns["extents"]
-        misfits_m2 = self.reliability.misfits(ids)
+        misfits_m2 = self.profiles.misfits(ids, extents)
         cov = self.reliability.off_line_cov(ids, extents, misfits_m2)
         return self.extents.map(belief, misfits_m2 > 0.0, cov)
+
+    def lack_of_fit(self, segments: Segments, owners: Int[np.ndarray, " s"]) -> Float[np.ndarray, "s 2 2"]:
+        """Return how far the face that each segment shows may be from the line of its wall, of (alpha rad, r m)."""
+        extents = self.records.columns["extents"][self.records.rows(owners)]
+        return cov_of_breaks(segments, self.profiles.misfits(owners, extents), extents[:, 1] - extents[:, 0])
 
     def observe(
         self,
@@ -60,6 +66,7 @@ class Landmarks:
         """
         self.records.rows(belief.ids)
         self.reliability.see(segments, owners)
+        self.profiles.see(belief, scan, segments, owners)
         forgotten = self.extents.see(belief, scan, segments, owners, begun, ambiguous)
         if not len(forgotten):
             return Observed(owners, forgotten)

@@ -41,12 +41,10 @@ def duplicate_of(
     touched: Collection[int],
     one_wall: float,
     config: MergingConfig = MergingConfig(),
-    cut: Collection[tuple[int, int]] = (),
 ) -> tuple[int, int] | None:
     """Return the ids (older, younger) of two landmarks of one wall, one of them among `touched`, or None.
 
-    `one_wall` is the probability level of the chi-square gate on the difference of the two lines; `cut` are pairs of
-    ids, the lower first, of which it is known that they are two walls (`change_points`).
+    `one_wall` is the probability level of the chi-square gate on the difference of the two lines.
 
     The belief is asked once at most, for all that geometry leaves; the likeliest place for a mistake, a large
     uncertainty between the two, is what the bounds of geometry are for.
@@ -57,8 +55,6 @@ def duplicate_of(
     ids = np.unique(pairs)
     joint = walls.belief.joint(ids)
     for pair, rows, is_hidden in zip(pairs.tolist(), np.searchsorted(ids, pairs), hidden, strict=True):
-        if tuple(pair) in cut:
-            continue
         two = joint.take(rows)
         turn = two.cov[3, 3] + two.cov[5, 5] - 2.0 * two.cov[3, 5]
         if turn <= config.shared.known_rad**2 and (is_hidden or same_line(two, one_wall)):

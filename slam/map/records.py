@@ -13,8 +13,6 @@ from jaxtyping import Int
 
 from .kernels.record_kernels import rows_of
 
-Pair = tuple[int, int]
-
 
 @dataclass(frozen=True)
 class Merger:
@@ -29,12 +27,11 @@ class Merger:
 
 
 class Records:
-    """Columns over the walls of one map, in ascending order of ids, and named sets of pairs of ids."""
+    """Columns over the walls of one map, in ascending order of ids."""
 
     def __init__(self) -> None:
         self.ids = np.zeros(0, dtype=np.int64)
         self.columns: dict[str, Any] = {}
-        self.pairs: dict[str, set[Pair]] = {}
         self._blanks: dict[str, Any] = {}
         self._mergers: list[Callable[[Merger], None]] = []
 
@@ -48,10 +45,6 @@ class Records:
             self.columns[name] = _filled(blank, len(self))
         if merge is not None:
             self._mergers.append(merge)
-
-    def relate(self, *names: str) -> None:
-        """Add named sets of pairs of ids."""
-        self.pairs |= {name: set() for name in names}
 
     def rows(self, ids: Int[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
         """Return the rows of walls; those that have none yet begin theirs."""
@@ -69,23 +62,17 @@ class Records:
             self.columns[name] = np.concatenate([column, _filled(self._blanks[name], len(ids))])[order]
 
     def remove(self, ids: Int[np.ndarray, " m"]) -> None:
-        """End the records of walls, and all that is said of pairs with them."""
+        """End the records of walls."""
         kept = ~np.isin(self.ids, ids)
         self.ids = self.ids[kept]
         for name, column in self.columns.items():
             self.columns[name] = column[kept]
-        gone = set(np.asarray(ids).tolist())
-        for name, pairs in self.pairs.items():
-            self.pairs[name] = {pair for pair in pairs if not gone & set(pair)}
 
     def merge(self, keep: int, drop: int, shift_m: float) -> None:
-        """Make one record of those of two ids: evidence adds up, pairs with the dropped wall are the kept one's."""
+        """Make one record of those of two ids: evidence adds up."""
         row, other = self.rows(np.array([keep, drop])).tolist()
         for merge in self._mergers:
             merge(Merger(row, other, shift_m))
-        for name, pairs in self.pairs.items():
-            renamed = {(keep if one == drop else one, keep if two == drop else two) for one, two in pairs}
-            self.pairs[name] = {pair for pair in renamed if pair[0] != pair[1]}
         self.remove(np.array([drop]))
 
 

@@ -1,8 +1,4 @@
-"""How far walls may be off the lines that stand for them, by what all scans saw of them.
-
-Around a corner of short faces a line fits six beams of each scan well enough, and another line from every place. One
-scan cannot tell such a line from a wall; all scans together can, and what they tell is stated with the wall.
-"""
+"""How reliable the directions of segments are, and how far short walls may be off the lines that stand for them."""
 
 from dataclasses import dataclass, field
 
@@ -14,7 +10,7 @@ from ..extraction.segments import Segments
 from ..extraction.straightness import StraightnessConfig, cov_of_faces
 from ..geometry.quantities import Angle, Distance
 from .kernels import reliability_kernels
-from .kernels.reliability_kernels import add_fits, add_lengths, keep_longest
+from .kernels.reliability_kernels import add_lengths, keep_longest
 from .records import Merger, Records
 
 
@@ -63,8 +59,6 @@ class Reliability:
         self._records = Records() if records is None else records
         self._records.declare(
             self._merge,
-            # Squared residuals beyond those of the noise, m^2, their variance by noise alone, and of how many beams.
-            residue=np.zeros(3),
             # The two longest pieces that scans saw of it, m.
             longest=np.zeros(2),
         )
@@ -74,24 +68,13 @@ class Reliability:
         used = (owners >= 0) & (segments.cov[:, 0, 0] > 0.0)
         seen = segments.take(used)
         rows, columns = self._records.rows(owners[used]), self._records.columns
-        add_fits(rows, seen.cov, seen.chi2, seen.beam_counts, columns["residue"])
         add_lengths(rows, seen.ends, columns["longest"])
 
     def _merge(self, merger: Merger) -> None:
         """Add what was seen of the dropped wall to the kept one's."""
-        residue, longest = self._records.columns["residue"], self._records.columns["longest"]
-        residue[merger.keep] += residue[merger.drop]
+        longest = self._records.columns["longest"]
         for length in longest[merger.drop].tolist():
             keep_longest(longest[merger.keep], length)
-
-    def misfits(self, ids: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        """Return how far the faces of walls are off their line, as variances across it, m^2.
-
-        Of two faces that meet in a corner each is off the line through both by twice what their residuals show. What
-        noise alone may show counts nothing: a straight wall lies on its line however often it was seen.
-        """
-        sigmas = float(self._config.shared.outlier_sigmas)
-        return reliability_kernels.misfits(self._records.columns["residue"][self._records.rows(ids)], sigmas)
 
     def off_line_cov(
         self, ids: Int[np.ndarray, " n"], extents: Float[np.ndarray, "n 2"], misfits_m2: Float[np.ndarray, " n"]

@@ -82,8 +82,11 @@ ASSOCIATION = (
 EXTENTS = "slam.map.kernels.extent_kernels"
 
 MAP = (
-    _off("lack of fit", "segments and walls that are off their lines by their own residuals are stated less certain",
-         ("slam.map.kernels.reliability_kernels", "across[k] = 4.0 * residue[k, 0] / residue[k, 2]", "across[k] = 0.0"),
+    _off("lack of fit of walls", "a wall of which all scans together show a step or a turn is stated less certain",
+         ("slam.map.kernels.profile_kernels", "found[k] = 4.0 * (", "found[k] = 0.0 * (")),
+    _off("lack of fit in observations", "and so are the segments that are matched to it",
+         ("slam.mapper", "cov + self._keeper.landmarks.lack_of_fit(seen, matches.pairs[:, 1])", "cov")),
+    _off("lack of fit of segments", "a segment that is off its line by its own residuals is stated less certain",
          ("slam.extraction.straightness_kernels",
           "found[k] = 4.0 * (chi2[k] - dof) * of_a_beam(cov[k], beam_counts[k]) / beam_counts[k]", "found[k] = 0.0")),
     _off("covariance of short faces", "short faces are stated less certain, since they may lie across corners",

@@ -141,18 +141,6 @@ def count_below(values: Int[np.ndarray, " m"], limit: float) -> int:
 
 
 @compiled
-def positions_of(bearings_rad: Float[np.ndarray, " b"], first_rad: float, returns: Returns) -> Int[np.ndarray, " b"]:
-    """Return the number of returns that come before each bearing; `first_rad` is that of the scan's first beam."""
-    at = np.empty(len(bearings_rad), np.int64)
-    for i in range(len(bearings_rad)):
-        beam = ((bearings_rad[i] - first_rad) % (2.0 * np.pi)) / returns.step_rad
-        if returns.period:
-            beam = (beam - returns.turn[0]) % returns.period + returns.turn[0]
-        at[i] = count_below(returns.turn, beam)
-    return at
-
-
-@compiled
 def turned(returns: Returns, at: int, angle: float) -> tuple[float, float]:
     """Return cosine and sine of the bearing `angle` rad past that of the return `at`."""
     c, s = np.cos(angle), np.sin(angle)

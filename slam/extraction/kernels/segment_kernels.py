@@ -10,8 +10,8 @@ from ..segments import EndKind
 from .fit_kernels import Fitted, fitted
 from .joint_kernels import sharpened
 from .line_kernels import crossing, line_of, met_at, polar, prefix_sums
-from .returns_kernels import Returns, Rules, positions_of, returns_of, rolled, run_of, turn_of, turned
-from .split_kernels import candidates, cut_at, settled, split, split_gains, surest
+from .returns_kernels import Returns, Rules, returns_of, rolled, run_of, turn_of, turned
+from .split_kernels import candidates, settled, split, split_gains, surest
 
 _OPEN, _OCCLUDED, _CORNER = int(EndKind.OPEN), int(EndKind.OCCLUDED), int(EndKind.CORNER)
 
@@ -37,10 +37,9 @@ def segments_of(
     sigma_share: float,
     farthest_m: float,
     is_full_turn: bool,
-    vertices_rad: Float[np.ndarray, " b"],
     rules: Rules,
 ) -> tuple[Found, Bool[np.ndarray, " n"]]:
-    """Return the straight segments of a scan, and which are good; at `vertices_rad` the wall is known to bend."""
+    """Return the straight segments of a scan, and which are good."""
     returns = returns_of(bearings_rad, ranges_m, sigmas_m, sigma_share, farthest_m, is_full_turn, rules)
     sums = prefix_sums(returns.cos, returns.sin, returns.ranges_m, returns.sigmas_m)
     gains = split_gains(sums, returns.breaks, rules)
@@ -50,8 +49,6 @@ def segments_of(
         sums = prefix_sums(returns.cos, returns.sin, returns.ranges_m, returns.sigmas_m)
         gains = split_gains(sums, returns.breaks, rules)
     pieces = split(sums, candidates(gains, returns.breaks, rules), returns.breaks, rules)
-    if len(vertices_rad):
-        pieces = cut_at(pieces, positions_of(vertices_rad, bearings_rad[0], returns), rules)
     pieces = settled(pieces, sums, returns.breaks, rules)
     return _described(fitted(sharpened(pieces, sums, returns, rules), returns, rules), returns, rules)
 

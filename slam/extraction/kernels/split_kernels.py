@@ -140,24 +140,6 @@ def bend_within(sums: Float[np.ndarray, "m1 6"], start: int, stop: int, rules: R
 
 
 @compiled
-def cut_at(pieces: Int[np.ndarray, "n 2"], at: Int[np.ndarray, " b"], rules: Rules) -> Int[np.ndarray, "k 2"]:
-    """Cut the pieces before the returns `at`; a part of fewer than `least_beams` returns is left loose."""
-    parts, count = np.empty((len(pieces) + len(at), 2), np.int64), 0
-    for k in range(len(pieces)):
-        start = pieces[k, 0]
-        while start < pieces[k, 1]:
-            stop = pieces[k, 1]
-            for position in at:
-                if start < position < stop:
-                    stop = position
-            if stop - start >= rules.least_beams:
-                parts[count, 0], parts[count, 1] = start, stop
-                count += 1
-            start = stop
-    return parts[:count]
-
-
-@compiled
 def settled(
     pieces: Int[np.ndarray, "n 2"], sums: Float[np.ndarray, "m1 6"], breaks: Int[np.ndarray, " b"], rules: Rules
 ) -> Int[np.ndarray, "n 2"]:

@@ -1,29 +1,12 @@
-"""Sums over the observations of each wall, and what they say of it: the loops of `reliability`."""
+"""The longest pieces that scans saw of walls, and what they say of them: the loops of `reliability`."""
 
 import math
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ...extraction.straightness_kernels import edge_cov, edge_variance, of_a_beam
+from ...extraction.straightness_kernels import edge_cov, edge_variance
 from ...geometry.compiled import compiled
-
-
-@compiled
-def add_fits(
-    rows: Int[np.ndarray, " m"],
-    cov: Float[np.ndarray, "m 2 2"],
-    chi2: Float[np.ndarray, " m"],
-    beam_counts: Int[np.ndarray, " m"],
-    residue: Float[np.ndarray, "n 3"],
-) -> None:
-    """Add the squared residuals of the fits of one scan, each to the row of its wall."""
-    for k in range(len(rows)):
-        row, beams, dof = rows[k], beam_counts[k], beam_counts[k] - 2.0
-        variance = of_a_beam(cov[k], beams)
-        residue[row, 0] += (chi2[k] - dof) * variance
-        residue[row, 1] += 2.0 * dof * variance * variance
-        residue[row, 2] += beams
 
 
 @compiled
@@ -42,20 +25,6 @@ def keep_longest(longest: Float[np.ndarray, "2"], length_m: float) -> None:
     """Take one more length into the two longest, in place."""
     longest[0] = max(longest[0], min(longest[1], length_m))
     longest[1] = max(longest[1], length_m)
-
-
-@compiled
-def misfits(residue: Float[np.ndarray, "n 3"], noise_sigmas: float) -> Float[np.ndarray, " n"]:
-    """Return how far faces of walls are off their line, as variances across it, m^2.
-
-    Of two faces that meet in a corner each is off the line through both by twice what their residuals show. What is
-    within so many standard errors of the noise counts nothing.
-    """
-    across = np.zeros(len(residue))
-    for k in range(len(residue)):
-        if residue[k, 0] > noise_sigmas * math.sqrt(residue[k, 1]):
-            across[k] = 4.0 * residue[k, 0] / residue[k, 2]
-    return across
 
 
 @compiled

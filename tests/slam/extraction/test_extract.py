@@ -217,30 +217,6 @@ def test_what_a_pillar_hides_is_occluded_and_what_runs_out_of_range_is_open():
     assert kinds == [["OPEN", "OCCLUDED"], ["OPEN", "OPEN"], ["OCCLUDED", "OPEN"]]
 
 
-@pytest.mark.parametrize("turn", [-2.9, -1.1, 0.0, 0.9, 2.2])
-@pytest.mark.parametrize("config", [LidarConfig(), LidarConfig(beams=91, fov_rad=np.pi)])
-def test_a_bend_known_beforehand_is_cut_also_where_one_line_fits_both_walls(turn, config):
-    """A wall 0.4 m ahead that bends by 1.5 degrees: one line is off by more than five of the sigmas it states."""
-    if config.beams == 91:
-        turn *= 0.1
-    slope = np.tan(np.deg2rad(1.5))
-    faces = np.array([[[0.4, -0.9], [0.4, 0.1]], [[0.4, 0.1], [0.4 - 0.8 * slope, 0.9]]])
-    scan = scan_of(faces, [0.0, 0.0, turn], config=config)
-    one = extract(scan)
-    assert abs(wrap(one.lines[0, 0] + turn)) > 5 * np.sqrt(one.cov[0, 0, 0])
-    lines = extract(scan, vertices_rad=np.array([wrap(np.arctan2(0.1, 0.4) - turn + 0.05)])).lines
-    np.testing.assert_allclose(wrap(lines[:, 0] + turn), [0.0, np.arctan(slope)], atol=1e-9)
-
-
-def test_of_a_bend_near_an_end_only_the_longer_part_is_a_segment():
-    scan = scan_of(wall(0.0), np.zeros(3))
-    whole = extract(scan)
-    first = scan.bearings_rad[whole.beams[0, 0]]
-    (part,) = extract(scan, vertices_rad=np.array([first + np.deg2rad(1.0)])).beams.tolist()
-    assert part[0] > whole.beams[0, 0]
-    assert part[1] == whole.beams[0, 1]
-
-
 def test_a_half_turn_scanner_sees_the_same_walls_and_ends_with_its_view():
     pose = [1.0, 1.1, 0.0]
     half = extract(scan_of(CLOSED, pose, config=LidarConfig(beams=181, fov_rad=np.pi)))

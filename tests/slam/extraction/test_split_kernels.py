@@ -11,12 +11,11 @@ from hypothesis import strategies as st
 from chainslam.slam.extraction.config import ExtractionConfig
 from chainslam.slam.extraction.extract import beams_of_scan, extract, rules_of
 from chainslam.slam.extraction.kernels.line_kernels import prefix_sums
-from chainslam.slam.extraction.kernels.returns_kernels import positions_of, returns_of, rolled
+from chainslam.slam.extraction.kernels.returns_kernels import returns_of
 from chainslam.slam.extraction.kernels.split_kernels import (
     bend_within,
     candidates,
     choose,
-    cut_at,
     settled,
     split_gains,
     surest,
@@ -79,19 +78,6 @@ def test_a_surface_breaks_off_where_no_wall_has_two_such_ranges(seed, full):
     np.testing.assert_array_equal(returns.turn % count, returns.beam)
     np.testing.assert_array_equal(returns.ranges_m, ranges[returns.beam])
     np.testing.assert_allclose(np.arctan2(returns.sin, returns.cos), np.angle(np.exp(1j * bearings[returns.beam])))
-
-
-@given(seed=seeds, by=st.integers(0, 30))
-@settings(max_examples=50, deadline=None)
-def test_a_bearing_comes_after_the_returns_before_it_wherever_the_ring_begins(seed, by):
-    rng = np.random.default_rng(seed)
-    bearings = np.linspace(-np.pi, np.pi, 36, endpoint=False)
-    returns = returns_of(*beams_of_scan(Scan(bearings, np.full(36, 2.0), SIGMA, 4.0, 0.0)), RULES)
-    returns = rolled(returns, by)
-    asked = rng.uniform(-7.0, 7.0, 5)
-    first = bearings[returns.beam[0]]
-    for bearing, at in zip(asked, positions_of(asked, bearings[0], returns), strict=True):
-        assert at == np.sum(np.mod(bearings[returns.beam] - first, 2 * np.pi) < np.mod(bearing - first, 2 * np.pi))
 
 
 @given(seed=seeds, middle=st.integers(6, 18))
@@ -168,20 +154,6 @@ def test_a_bend_is_where_two_lines_save_most_and_more_than_a_segment_costs(seed,
         assert found == -1
 
 
-@given(seed=seeds)
-@settings(max_examples=100, deadline=None)
-def test_pieces_are_cut_and_parts_that_are_too_short_stay_loose(seed):
-    rng = np.random.default_rng(seed)
-    marks = np.sort(rng.choice(40, 6, replace=False)).tolist()
-    pieces = [(a, b) for a, b in zip(marks[::2], marks[1::2], strict=True) if b - a >= 3]
-    at = rng.integers(0, 41, 4)
-    expected = []
-    for start, stop in pieces:
-        ends = sorted({start, stop, *(int(x) for x in at if start < x < stop)})
-        expected += [list(part) for part in itertools.pairwise(ends) if part[1] - part[0] >= CONFIG.least_beams]
-    assert cut_at(np.array(pieces, dtype=np.int64).reshape(-1, 2), at, RULES).tolist() == expected
-
-
 @given(seed=seeds, broken=st.booleans())
 @settings(max_examples=50, deadline=None)
 def test_cuts_settle_where_their_two_lines_fit_best_all_at_once(seed, broken):
@@ -200,12 +172,6 @@ def test_cuts_settle_where_their_two_lines_fit_best_all_at_once(seed, broken):
             moved[k][1] = moved[k + 1][0] = min(tried, key=lambda at: beams.chi2(one[0], at) + beams.chi2(at, other[1]))
         pieces = moved
     assert found.tolist() == pieces
-
-
-def test_a_cut_that_leaves_nothing_leaves_no_segment():
-    scan = Scan(np.linspace(-0.1, 0.1, 5), np.full(5, 2.0), SIGMA, 4.0, 0.0)
-    assert len(extract(scan)) == 1
-    assert len(extract(scan, vertices_rad=scan.bearings_rad[1:4] - 0.01)) == 0
 
 
 @given(seed=seeds)

@@ -17,7 +17,6 @@ from chainslam.slam.map.chains import connect
 from chainslam.slam.map.displacement import across, along
 from chainslam.slam.map.extents import WallsConfig
 from chainslam.slam.map.landmarks import Landmarks
-from chainslam.slam.map.polylines.change_points import ChangePointsConfig
 from tests.slam.test_mapper import AT_ITS_WORD, faces_of, walk
 
 NEAR_M = 1.0
@@ -108,7 +107,7 @@ def test_two_rooms_that_come_apart_go_each_its_way():
 
 def landmarks_of(faces):
     """Walls whose ends were seen where the faces end, and how the map is told once they lie elsewhere."""
-    known = Landmarks(WallsConfig(), ChangePointsConfig(), 5)
+    known = Landmarks(WallsConfig(), 5)
     anchors = faces.mean(axis=1)
     half = 0.5 * np.hypot(*(faces[:, 1] - faces[:, 0]).T)
     rows = known.records.rows(np.arange(len(faces)))

@@ -12,10 +12,9 @@ from chainslam.slam.extraction.segments import EndKind
 from chainslam.slam.geometry.lines import normals, through
 from chainslam.slam.map.extents import WallsConfig
 from chainslam.slam.map.landmarks import Landmarks
-from chainslam.slam.map.polylines.change_points import ChangePointsConfig
 from chainslam.slam.robot import Scan
 
-SETTINGS = (WallsConfig(), ChangePointsConfig(), 5)
+SETTINGS = (WallsConfig(), 5)
 CONFIG = WallsConfig()
 
 

@@ -57,8 +57,6 @@ def test_a_wall_entered_twice_is_found_whatever_pieces_were_seen(alpha, x, y, on
     assert twice(walls(lines), {10}) == (3, 10)
     assert twice(walls(lines), {3}) == (3, 10)
     assert twice(walls(lines), set()) is None
-    assert twice(walls(lines), {10}, cut={(3, 10)}) is None, "known to be two"
-    assert twice(walls(lines), {10}, cut={(3, 11)}) == (3, 10)
 
 
 @settings(max_examples=60, deadline=None)

@@ -11,11 +11,14 @@ from chainslam.slam.backends import BACKENDS
 from chainslam.slam.extraction.extract import extract
 from chainslam.slam.extraction.segments import Segments
 from chainslam.slam.extraction.straightness import StraightnessConfig
-from chainslam.slam.extraction.straightness_kernels import edge_cov
 from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.map.extents import WallsConfig
+from chainslam.slam.map.landmarks import Landmarks
 from chainslam.slam.map.reliability import Reliability, ReliabilityConfig, are_clear, as_told
 from chainslam.slam.mapper import Mapper
 from chainslam.slam.robot import Odometry, Scan
+from tests.slam.map.scenes import bent
+from tests.slam.map.test_extents import belief_of
 
 SIGMA_M = 0.01
 STEPS = shapely.Polygon([
@@ -67,8 +70,8 @@ def test_real_scans_of_straight_walls_give_no_wall_a_misfit(seed):
     places = rng.uniform(0, 4, (500, 2))
     places = places[shapely.contains_xy(room.buffer(-0.25), places[:, 0], places[:, 1])][:120]
     poses = np.column_stack([places, rng.uniform(-np.pi, np.pi, len(places))])
-    reliability, seen = Reliability(), np.zeros(len(faces), dtype=bool)
-    for _, scan, hit in scans(faces, poses, rng):
+    walls = Landmarks(WallsConfig(housekeeping=False), 5)
+    for k, scan, hit in scans(faces, poses, rng):
         segments = extract(scan)
         first, last = segments.beams.T
         beams = len(scan.ranges_m)
@@ -76,9 +79,28 @@ def test_real_scans_of_straight_walls_give_no_wall_a_misfit(seed):
         pure = np.array([len(set(run)) == 1 for run in runs], dtype=bool)
         middle = (first + (last - first) % beams // 2) % beams
         owners = np.where(pure & ~segments.is_tentative, hit[middle], -1)
-        reliability.see(segments, owners)
-        seen[owners[owners >= 0]] = True
-    assert not reliability.misfits(np.flatnonzero(seen)).any()
+        walls.observe(belief_of(faces, poses[k]), scan, segments, owners)
+    found = walls.map(belief_of(faces, poses[-1]))
+    assert np.count_nonzero(found.observations > 50) > 3
+    assert not found.crooked.any()
+
+
+@pytest.mark.parametrize("turn_deg", [1.0, 2.0])
+def test_of_two_faces_that_meet_each_is_off_the_line_through_both_by_what_is_stated(turn_deg):
+    """The middle of a wall stands out; the faces beside it turn by half the bend either way."""
+    rng, turn_rad = np.random.default_rng(1), np.deg2rad(turn_deg)
+    faces = bent(turn_rad, half_m=0.7)
+    through_both, walls = [[faces[0, 0], faces[1, 1]]], Landmarks(WallsConfig(), 5)
+    poses = rng.uniform([-0.3, -1.5, -3.0], [0.3, -0.6, 3.0], (200, 3))
+    for k, scan, _ in scans(faces, poses, rng):
+        segments = extract(scan)
+        owners, belief = np.zeros(len(segments), dtype=np.int64), belief_of(through_both, poses[k])
+        walls.observe(belief, scan, segments, owners)
+    stated = walls.map(belief)
+    assert stated.crooked.all()
+    assert np.sqrt(stated.off_line_cov[0, 0, 0]) == pytest.approx(np.tan(0.5 * turn_rad), rel=0.1)
+    lack = walls.lack_of_fit(segments, owners)
+    np.testing.assert_allclose(np.sqrt(lack[:, 0, 0]), np.tan(0.5 * turn_rad), rtol=0.1)
 
 
 def test_clear_are_many_beams_and_a_known_direction():
@@ -101,47 +123,6 @@ def test_beside_a_clear_observation_few_beams_tell_their_distance_at_their_middl
     np.testing.assert_allclose(at_middle @ wide @ at_middle.T, np.diag([1e-6 + FACES.heading_rad**2, 4e-6]), atol=1e-12)
     np.testing.assert_array_equal(clear, cov)
     np.testing.assert_array_equal(as_told(cov[None], few, FACES), cov[None], "alone it is all that there is")
-
-
-def observed_over(points, rng):
-    """Return the segment of a line by least squares through points near x = 1, seen from the origin with noise."""
-    off = points[:, 0] + SIGMA_M * rng.standard_normal(len(points)) - 1.0
-    y = points[:, 1]
-    slope, offset = np.polyfit(y - y.mean(), off, 1)
-    chi2 = np.sum((off - offset - slope * (y - y.mean())) ** 2) / SIGMA_M**2
-    turn, across = SIGMA_M**2 / np.sum((y - y.mean()) ** 2), SIGMA_M**2 / len(y)
-    cov = np.array([[turn, turn * y.mean()], [turn * y.mean(), across + turn * y.mean() ** 2]])
-    seen = observation(-np.arctan(slope), 1.0, len(y), chi2, y[-1] - y[0])
-    return replace(seen, cov=cov[None], lines=np.array([[-np.arctan(slope), 1.0 + offset]]))
-
-
-@pytest.mark.parametrize("bend_rad", [0.4, 0.8])
-def test_of_two_faces_that_meet_each_is_off_the_line_through_both_by_what_is_told(bend_rad):
-    """The middle of a wall stands out; the faces beside it turn by half the bend either way."""
-    rng, reliability = np.random.default_rng(1), Reliability()
-    y = np.linspace(-0.15, 0.15, 16)
-    for _ in range(100):
-        points = np.column_stack([1.0 + np.tan(0.5 * bend_rad) * np.abs(y), y])
-        reliability.see(observed_over(points, rng), OWNER)
-    (told,) = edge_cov(reliability.misfits(OWNER), np.array([0.3]), np.zeros(1))
-    assert np.sqrt(told[0, 0]) == pytest.approx(np.tan(0.5 * bend_rad), rel=0.1)
-
-
-@pytest.mark.parametrize(("misfit", "is_told"), [(1.0, False), (1.2, False), (1.3, True), (1.4, True)])
-def test_a_line_over_a_step_is_told_with_its_misfit(misfit, is_told):
-    """In an office a line of 1.1 m over two faces, of chi-square 1.3 a degree of freedom, was 20 sigmas off."""
-    reliability = Reliability()
-    for _ in range(38):
-        reliability.see(observation(0.0, 0.01, beams=10, chi2=8.0 * misfit, length_m=1.1), OWNER)
-    assert (reliability.misfits(OWNER)[0] > 0.0) == is_told
-
-
-def test_a_straight_wall_is_on_its_line_however_often_it_was_seen():
-    rng, reliability = np.random.default_rng(2), Reliability()
-    for _ in range(100):
-        points = np.column_stack([np.ones(16), np.linspace(-0.15, 0.15, 16)])
-        reliability.see(observed_over(points, rng), OWNER)
-    assert reliability.misfits(OWNER) == [0.0]
 
 
 def test_a_wall_counts_as_long_as_two_scans_saw_it():
@@ -167,17 +148,6 @@ def test_the_longest_pieces_of_two_walls_that_are_one_are_the_longest_of_both():
         reliability.see(observation(0.0, 0.01, length_m=length), np.array([owner]))
     reliability._records.merge(0, 1, 0.0)
     np.testing.assert_allclose(reliability._records.columns["longest"], [[0.5, 0.9]])
-
-
-def test_what_is_left_of_two_walls_that_are_one_adds_up():
-    rng, apart, one = np.random.default_rng(3), Reliability(), Reliability()
-    y = np.linspace(-0.15, 0.15, 16)
-    for k in range(60):
-        seen = observed_over(np.column_stack([1.0 + 0.3 * np.abs(y), y]), rng)
-        apart.see(seen, np.array([k % 2]))
-        one.see(seen, OWNER)
-    apart._records.merge(0, 1, 0.0)
-    np.testing.assert_allclose(apart.misfits(OWNER), one.misfits(OWNER), rtol=1e-9)
 
 
 def test_a_line_over_two_faces_turns_nobody_beside_a_clear_wall():

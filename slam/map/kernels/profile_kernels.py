@@ -1,0 +1,178 @@
+"""What the beams of one scan say of steps and turns of walls, at places along them: the loops of `profiles`."""
+
+import math
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ...geometry.compiled import compiled
+from ...geometry.numerics import TINY
+
+LEAST_BEAMS = 2
+"""So many beams must lie on either side of a break: a single one at an end may be of another face."""
+SAME = 1e-6
+"""A step and a turn of which beams tell less apart, as the share of the determinant, look the same to them."""
+
+
+@compiled
+def lines_from(
+    pose_world: Float[np.ndarray, "3"], anchors: Float[np.ndarray, "m 2"], means: Float[np.ndarray, "m 2"]
+) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, " m"]]:
+    """Return walls as lines (alpha, r) from a pose, and where its perpendiculars meet them, m from their anchors."""
+    lines, feet = np.empty((len(means), 2)), np.empty(len(means))
+    for k in range(len(means)):
+        c, s = math.cos(means[k, 0]), math.sin(means[k, 0])
+        east, north = pose_world[0] - anchors[k, 0], pose_world[1] - anchors[k, 1]
+        lines[k, 0], lines[k, 1] = means[k, 0] - pose_world[2], means[k, 1] - c * east - s * north
+        feet[k] = c * north - s * east
+    return lines, feet
+
+
+@compiled
+def beams_on_lines(
+    runs: Int[np.ndarray, "m 2"],
+    seen: Float[np.ndarray, "m 2"],
+    wall_of: Int[np.ndarray, " m"],
+    lines: Float[np.ndarray, "w 2"],
+    feet: Float[np.ndarray, " w"],
+    bearings_rad: Float[np.ndarray, " b"],
+    ranges_m: Float[np.ndarray, " b"],
+    sigmas_m: Float[np.ndarray, " b"],
+    gate_sigmas: float,
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """Return where beams meet the lines of walls, m along these, by how much they miss them, its sigma, and whose.
+
+    Each segment has the beams from its first to its last, in a turn of the scanner; those two may be of another face,
+    and so may beams that miss the segment's own line. The segments are given wall by wall, in the order of a walk.
+    """
+    most, turn = 0, len(bearings_rad)
+    for k in range(len(runs)):
+        most += (runs[k, 1] - runs[k, 0]) % turn + 1
+    along, across, sigma, of = np.empty(most), np.empty(most), np.empty(most), np.empty(most, np.int64)
+    count = 0
+    for k in range(len(runs)):
+        beams, w = (runs[k, 1] - runs[k, 0]) % turn + 1, wall_of[k]
+        for number in range(1, beams - 1):
+            beam = (runs[k, 0] + number) % turn
+            cosine = math.cos(bearings_rad[beam] - seen[k, 0])
+            if abs(ranges_m[beam] * cosine - seen[k, 1]) < gate_sigmas * sigmas_m[beam] * cosine:
+                off_normal = bearings_rad[beam] - lines[w, 0]
+                # Where beams meet the line, not where they ended: at a flat angle noise in range is noise along it.
+                along[count] = feet[w] + lines[w, 1] * math.tan(off_normal)
+                across[count] = ranges_m[beam] * math.cos(off_normal) - lines[w, 1]
+                sigma[count], of[count] = sigmas_m[beam] * cosine, w
+                count += 1
+    return along[:count].copy(), across[:count].copy(), sigma[:count].copy(), of[:count].copy()
+
+
+@compiled
+def places_between(
+    along: Float[np.ndarray, " k"], of: Int[np.ndarray, " k"], pitch_m: float
+) -> tuple[Int[np.ndarray, " p"], Int[np.ndarray, " p"]]:
+    """Return the places, in pitches, between the first and the last beam on each wall, and whose they are.
+
+    The beams are given wall by wall, in the order in which they meet it.
+    """
+    place, place_of, count = np.empty(8, np.int64), np.empty(8, np.int64), 0
+    start = 0
+    while start < len(of):
+        stop = start
+        while stop < len(of) and of[stop] == of[start]:
+            stop += 1
+        first, last = math.floor(along[start] / pitch_m) + 1, math.ceil(along[stop - 1] / pitch_m)
+        for at in range(first, last):
+            if count == len(place):
+                place = np.concatenate((place, np.empty(count, np.int64)))
+                place_of = np.concatenate((place_of, np.empty(count, np.int64)))
+            place[count], place_of[count] = at, of[start]
+            count += 1
+        start = stop
+    return place[:count].copy(), place_of[:count].copy()
+
+
+@compiled
+def breaks_of_beams(
+    along: Float[np.ndarray, " k"],
+    across: Float[np.ndarray, " k"],
+    sigma: Float[np.ndarray, " k"],
+    of: Int[np.ndarray, " k"],
+    places: Float[np.ndarray, " p"],
+    place_of: Int[np.ndarray, " p"],
+) -> Float[np.ndarray, "5 p"]:
+    """Return what the beams of one scan, off lines by `across` m, say of a break at each place along a wall.
+
+    The model is across = a + b along + step [along > place] + turn max(along - place, 0). The wall's offset a and slope
+    b, of which the errors of pose and line are part, are eliminated. The five sums are the information on (step, turn),
+    as (ss, st, tt), and the information vector (s, t); all 0 where too few beams lie on either side.
+    Beams, and places, are given wall by wall in ascending order.
+    """
+    sums = np.zeros((5, len(places)))
+    start, stop, p = 0, 0, 0
+    while p < len(places):
+        while stop < len(of) and of[stop] <= place_of[p]:
+            start = start if of[stop] == of[start] else stop
+            stop += 1
+        middle, wall = 0.5 * (along[start] + along[stop - 1]), place_of[p]
+        t0, t1, t2, f0, f1 = 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(start, stop):
+            x, weight = along[k] - middle, 1.0 / (sigma[k] * sigma[k])
+            t0, t1, t2 = t0 + weight, t1 + weight * x, t2 + weight * x * x
+            f0, f1 = f0 + weight * across[k], f1 + weight * x * across[k]
+        det = t0 * t2 - t1 * t1
+        w0, w1, w2, e0, e1, beyond = t0, t1, t2, f0, f1, start
+        while p < len(places) and place_of[p] == wall:
+            s = places[p] - middle
+            while beyond < stop and along[beyond] - middle <= s:
+                x, weight = along[beyond] - middle, 1.0 / (sigma[beyond] * sigma[beyond])
+                w0, w1, w2 = w0 - weight, w1 - weight * x, w2 - weight * x * x
+                e0, e1 = e0 - weight * across[beyond], e1 - weight * x * across[beyond]
+                beyond += 1
+            if min(stop - beyond, beyond - start) >= LEAST_BEAMS and det > TINY:
+                h0, h1, hh, he = w1 - s * w0, w2 - s * w1, w2 - 2.0 * s * w1 + s * s * w0, e1 - s * e0
+                # How a step, and a turn, look like an offset and a slope.
+                a0, b0 = (t2 * w0 - t1 * w1) / det, (t0 * w1 - t1 * w0) / det
+                a1, b1 = (t2 * h0 - t1 * h1) / det, (t0 * h1 - t1 * h0) / det
+                sums[0, p], sums[1, p] = w0 - a0 * w0 - b0 * w1, h0 - a0 * h0 - b0 * h1
+                sums[2, p] = hh - a1 * h0 - b1 * h1
+                sums[3, p], sums[4, p] = e0 - a0 * f0 - b0 * f1, he - a1 * f0 - b1 * f1
+            p += 1
+    return sums
+
+
+@compiled
+def surest(sums: Float[np.ndarray, "5 p"]) -> tuple[int, float, float, float]:
+    """Return where the likeliest break lies, its step m and turn rad, and its likelihood ratio.
+
+    That is by how much the squared residuals of all beams, in their variances, are less with the break.
+    """
+    best, best_step, best_turn, best_ratio = 0, 0.0, 0.0, 0.0
+    for p in range(sums.shape[1]):
+        ss, st, tt = sums[0, p], sums[1, p], sums[2, p]
+        det = ss * tt - st * st
+        if det > SAME * ss * tt:
+            step, turn = (tt * sums[3, p] - st * sums[4, p]) / det, (ss * sums[4, p] - st * sums[3, p]) / det
+            ratio = step * sums[3, p] + turn * sums[4, p]
+            if ratio > best_ratio:
+                best, best_step, best_turn, best_ratio = p, step, turn, ratio
+    return best, best_step, best_turn, best_ratio
+
+
+@compiled
+def misfits(broken: Float[np.ndarray, "n 3"], extents: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+    """Return how far the faces of walls are off the lines through them, as variances across, m^2.
+
+    A face is off the line through both by twice the root mean square of what both are, anywhere along the wall.
+    """
+    found = np.zeros(len(broken))
+    for k in range(len(broken)):
+        place, step, turn = broken[k]
+        half = 0.5 * (extents[k, 1] - extents[k, 0])
+        s = place - 0.5 * (extents[k, 0] + extents[k, 1])
+        if (step != 0.0 or turn != 0.0) and half > 0.0 and abs(s) < half:
+            w0, w1, w2 = half - s, 0.5 * (half * half - s * s), (half**3 - s**3) / 3.0
+            h0, h1, hh = w1 - s * w0, w2 - s * w1, w2 - 2.0 * s * w1 + s * s * w0
+            t0, t2 = 2.0 * half, 2.0 * half**3 / 3.0
+            a0, b0, a1, b1 = w0 / t0, w1 / t2, h0 / t0, h1 / t2
+            ss, st, tt = w0 - a0 * w0 - b0 * w1, h0 - a0 * h0 - b0 * h1, hh - a1 * h0 - b1 * h1
+            found[k] = 4.0 * (step * step * ss + 2.0 * step * turn * st + turn * turn * tt) / t0
+    return found

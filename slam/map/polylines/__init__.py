@@ -1,1 +1,0 @@
-"""Bends: where a wall is a polyline, and what all scans together know of it."""

@@ -1,1 +1,0 @@
-"""What scans say of bends and steps, in compiled loops."""
