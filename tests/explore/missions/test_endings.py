@@ -53,19 +53,16 @@ def test_a_wall_that_turns_by_a_few_degrees_is_two_walls_though_it_looks_straigh
     assert len(last.chains[0].walls) == 5
 
 
-@pytest.mark.parametrize(("depth_m", "least"), [(0.05, 6), (0.1, 8)])
-def test_with_noise_the_sides_of_bends_join(depth_m, least):
-    """Walls that turn by 6 or 11 degrees every metre: each was mapped past the bend, and looked at again and again."""
+def test_with_noise_the_sides_of_bends_join():
+    """Walls that turn by 11 degrees every metre: each was mapped past the bend, and looked at again and again."""
     across = np.arange(0.0, 5.1, 1.0)
-    below = np.column_stack([across, depth_m * (np.arange(6) % 2)])
+    below = np.column_stack([across, 0.1 * (np.arange(6) % 2)])
     room = shapely.Polygon(np.concatenate([below, [5.0, 3.5] - below]))
-    joined = 0
     for seed in range(8):
         last, robot = explored(room, (2.0, 1.5, 0.3), seed, errorless=False)
-        if [chain.is_closed for chain in last.chains] == [True]:
-            assert len(last.chains[0].walls) == 12
-            joined += len(robot.record.poses_world) < 350
-    assert joined >= least
+        assert [chain.is_closed for chain in last.chains] == [True]
+        assert len(last.chains[0].walls) == 12
+        assert len(robot.record.poses_world) < 350
 
 
 @pytest.mark.parametrize("start_x", [0.4, 0.6, 0.8])
