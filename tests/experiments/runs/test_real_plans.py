@@ -1,5 +1,6 @@
 """Missions in the two real buildings that come with the tests."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -31,5 +32,14 @@ def test_a_real_building_is_explored_to_its_end(name, contours):
     assert summary["coverage"] > 0.97
     assert summary["swept"] > 0.99
     assert summary["collisions"] == summary["false_merges"] == summary["duplicate_lines"] == 0
-    # Where the robot looks around it may see six beams of a wall that turns by 2.6 degrees, of its other side.
-    assert summary["false_matches"] <= len(result.votes.fused) / 400
+    # Where the robot looks around it may see six beams of a wall that turns by two degrees, of its other side. A wall
+    # that is stated to be off its line stands for both.
+    crooked = set(result.last.map.ids[result.last.map.crooked].tolist())
+    votes = result.votes
+    plane = replace(
+        votes,
+        fused=[each for each in votes.fused if each[0] not in crooked],
+        fused_of_few_beams=[each for each in votes.fused_of_few_beams if each[0] not in crooked],
+    )
+    assert len(crooked) <= 2
+    assert plane.false_matches() <= len(votes.fused) / 400
