@@ -29,7 +29,7 @@ class SharedConfig:
     """Thickness of a thin wall: ends closer together may be one corner, and beams this far behind a line have passed
     through it."""
     beyond_m: Distance = 0.15
-    """How far a wall must reach past a breakpoint to lie across it."""
+    """Largest gap between two pieces of one curved obstacle."""
     face_m: Size = 0.2
     """Length below which a face has no reliable direction of its own."""
     short_m: Distance = 0.3
@@ -45,15 +45,15 @@ class SharedConfig:
     moved."""
     known_rad: Spread = float(np.deg2rad(1.0))
     """Standard deviation up to which the angle between two walls counts as known, and smallest angle of a
-    breakpoint."""
+    bend whose sides join though they overlap."""
     straight_rad: Angle = float(np.deg2rad(5.0))
     """Angle below which two walls may be one, or one may continue the other."""
     sharp_rad: Angle = float(np.deg2rad(30.0))
-    """Angle above which two walls meet in a corner that a single scan shows."""
+    """Angle above which two walls meet in a corner: they join only where their ends are near."""
     noise_sigmas: Sigmas = 4.0
-    """Deviation, in standard deviations, above which a beam does not belong to a line, or a wall is not straight."""
+    """Deviation, in standard deviations, above which a beam does not belong to a line, or to a wall."""
     outlier_sigmas: Sigmas = 3.0
-    """Deviation, in standard deviations, above which a beam is not assigned to a line, and a wall has a lack of fit."""
+    """Deviation, in standard deviations, above which a beam is not assigned to a line, or a segment has lack of fit."""
     scans: Count = 2
     """Number of scans that must agree before the map is changed on their evidence."""
 

@@ -11,7 +11,7 @@ from ..geometry.circles import cov_of_rounding
 from .kernels import wall_kernels
 
 ESTABLISHED = 10
-"""A wall seen this often outlives one scan that speaks against it, and may be the side of a bend."""
+"""Ends of walls seen this often may join at a bend past which both reach."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class StochasticMap:
     tentative: Bool[np.ndarray, " n"]
     """Walls that were not seen well enough yet to be followed or chained."""
     crooked: Bool[np.ndarray, " n"]
-    """Walls whose beams, over many scans, do not lie on a line (`reliability`): they are stated to be off it by as
+    """Walls whose beams, over many scans, do not lie on a line (`profiles`): they are stated to be off it by as
     much."""
     whole: Bool[np.ndarray, " n"] | None = None
     """Walls of which scan after scan showed both ends, hidden by nothing: they reach no farther. None where unknown."""
