@@ -14,9 +14,10 @@ from jaxtyping import Float, Int
 from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig
 from ..extraction.segments import Segments
+from ..geometry.line_kernels import lines_from
 from ..geometry.lines import directions
 from ..robot import Scan
-from .kernels.profile_kernels import beams_on_lines, breaks_of_beams, lines_from, misfits, places_between, surest
+from .kernels.profile_kernels import beams_on_lines, breaks_of_beams, misfits, places_between, surest
 from .records import Merger, Records
 
 Sums = Float[np.ndarray, "5 p"]

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ...geometry.compiled import compiled
-from ...geometry.line_kernels import GRAZING
+from ...geometry.line_kernels import GRAZING, lines_from
 
 
 class Odds(NamedTuple):
@@ -33,23 +33,19 @@ def crossing(
     margin_m: float,
 ) -> Int[np.ndarray, " n"]:
     """Return how many beams reach each wall between its ends: they end on it, or go on beyond it."""
-    counts, k = np.zeros(len(means), np.int64), len(bearings_rad)
-    x, y = np.empty(k), np.empty(k)
-    for beam in range(k):
-        x[beam], y[beam] = math.cos(bearings_rad[beam] + pose_world[2]), math.sin(bearings_rad[beam] + pose_world[2])
+    counts = np.zeros(len(means), np.int64)
+    x, y = np.cos(bearings_rad), np.sin(bearings_rad)
+    lines, feet = lines_from(pose_world, anchors, means)
     for n in range(len(means)):
-        nx, ny = math.cos(means[n, 0]), math.sin(means[n, 0])
-        east, north = anchors[n, 0] - pose_world[0], anchors[n, 1] - pose_world[1]
-        r, foot = means[n, 1] + nx * east + ny * north, ny * east - nx * north
-        farthest = max(-extents[n, 0], extents[n, 1])
-        if r <= 0.0 or math.hypot(east, north) - farthest > range_m:
+        nx, ny, r = math.cos(lines[n, 0]), math.sin(lines[n, 0]), lines[n, 1]
+        if r <= 0.0 or r > range_m or feet[n] + range_m < extents[n, 0] or feet[n] - range_m > extents[n, 1]:
             continue
-        for beam in range(k):
+        for beam in range(len(bearings_rad)):
             cosine = x[beam] * nx + y[beam] * ny
             if cosine <= GRAZING:
                 continue
             distance = r / cosine
-            along = foot + distance * (y[beam] * nx - x[beam] * ny)
+            along = feet[n] + distance * (y[beam] * nx - x[beam] * ny)
             reaches = (passed_m[beam] - distance) * cosine >= -margin_m
             counts[n] += reaches and extents[n, 0] < along < extents[n, 1]
     return counts

@@ -15,20 +15,6 @@ SAME = 1e-6
 
 
 @compiled
-def lines_from(
-    pose_world: Float[np.ndarray, "3"], anchors: Float[np.ndarray, "m 2"], means: Float[np.ndarray, "m 2"]
-) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, " m"]]:
-    """Return walls as lines (alpha, r) from a pose, and where its perpendiculars meet them, m from their anchors."""
-    lines, feet = np.empty((len(means), 2)), np.empty(len(means))
-    for k in range(len(means)):
-        c, s = math.cos(means[k, 0]), math.sin(means[k, 0])
-        east, north = pose_world[0] - anchors[k, 0], pose_world[1] - anchors[k, 1]
-        lines[k, 0], lines[k, 1] = means[k, 0] - pose_world[2], means[k, 1] - c * east - s * north
-        feet[k] = c * north - s * east
-    return lines, feet
-
-
-@compiled
 def beams_on_lines(
     runs: Int[np.ndarray, "m 2"],
     seen: Float[np.ndarray, "m 2"],
