@@ -23,7 +23,7 @@ class MapperConfig:
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     walls: WallsConfig = field(default_factory=WallsConfig)
     merging: MergingConfig | None = field(default_factory=MergingConfig)
-    """Without it, one wall may be in the map twice."""
+    """Without it, one wall may be in the map twice, and walls run on past the place where they bend."""
     recovery: RecoveryConfig | None = field(default_factory=RecoveryConfig)
     """Without it, the odometry is always believed."""
     ranges: RangesConfig = field(default_factory=RangesConfig)

@@ -18,6 +18,7 @@ from .estimation.backend import Backend, Belief
 from .estimation.mounting import belief_of_body, odometry_of_body
 from .extraction.segments import Segments
 from .extraction.straightness import cov_of_bows, cov_of_misfits
+from .map.bends import ends_at_bends
 from .map.chains import Chain
 from .map.existence import LandmarkCandidates
 from .map.landmarks import Landmarks
@@ -91,7 +92,7 @@ class MapKeeper:
         """
         begun = self._initialised(scan, segments, matches)
         owners = self._observed(scan, segments, *begun, matches.ambiguous)
-        walls, merged = self._merged(owners, self.map())
+        walls, merged = self._merged(owners, self._ended_at_bends(float(scan.range_max_m)))
         for keep, drop in merged:
             owners = np.where(owners == drop, keep, owners)
         return walls, owners, merged
@@ -137,6 +138,17 @@ class MapKeeper:
         if len(observed.forgotten):
             self.backend.remove(observed.forgotten.tolist())
         return observed.owners
+
+    def _ended_at_bends(self, range_m: float) -> StochasticMap:
+        """Let walls end where they bend, within range; return the map, which is as it was where walls never merge."""
+        walls = self.map()
+        if self.config.merging is None:
+            return walls
+        pairs, along = ends_at_bends(walls, range_m, self.config.matching.one_wall, self.config.shared)
+        if not len(pairs):
+            return walls
+        self.landmarks.extents.meet(pairs, along)
+        return self.map()
 
     def _merged(
         self, owners: Int[np.ndarray, " s"], walls: StochasticMap

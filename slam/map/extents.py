@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from sys import maxsize
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -51,15 +50,12 @@ class Extents:
         self._config = config
         self._odds = config.existence.odds(sure_beams)
         self._records = records
-        self._scans = 0
         self._records.declare(
             self._merge,
             extents=np.array([np.inf, -np.inf]),
             placed=np.full(2, np.nan),
             spacing=np.full(2, np.inf),
             observations=0,
-            last_seen=0,
-            overlaid=np.zeros(2, dtype=np.int64),
             against=0,
             whole=0,
             log_odds=config.existence.believed,
@@ -98,6 +94,13 @@ class Extents:
         whole = self._records.columns["whole"] >= self._config.shared.scans
         return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked, whole, off_line_cov)
 
+    def meet(self, pairs: Int[np.ndarray, "k 2"], along: Float[np.ndarray, "k 2"]) -> None:
+        """End the walls of each pair of ids, the one before the other, so far along each, m, where they reach past."""
+        before, after = self._records.rows(pairs[:, 0]), self._records.rows(pairs[:, 1])
+        extents = self._records.columns["extents"]
+        np.minimum.at(extents[:, 1], before, along[:, 0])
+        np.maximum.at(extents[:, 0], after, along[:, 1])
+
     def see(
         self,
         belief: Belief,
@@ -112,29 +115,32 @@ class Extents:
         `begun` holds ids of walls that begin more likely than others, and their log odds; the scan may show
         `ambiguous` ones, too.
         """
-        self._scans += 1
         used = np.flatnonzero(owners >= 0)
         rows = self._records.rows(owners[used])
         columns, shared = self._records.columns, self._config.shared
-        scans = shared.scans if self._config.housekeeping else maxsize
         extents, lines = columns["extents"], (belief.pose_world, belief.anchors, belief.means)
-        seen = segments.ends, segments.lines, segments.end_kinds, owners, used, rows
-        kept = extents, columns["spacing"], columns["whole"], columns["overlaid"]
-        take_in(*seen, *lines, scan.step_rad, *kept, float(shared.thickness_m), scans)
+        seen = segments.ends[used], segments.lines[used], segments.end_kinds[used], rows
+        kept = extents, columns["spacing"], columns["whole"]
+        take_in(*seen, *lines, scan.step_rad, *kept, float(shared.thickness_m))
         columns["observations"][rows] += 1  # of a wall with two segments, too, by one: summed before it is stored
-        columns["last_seen"][rows] = self._scans
-        self._look(belief, scan, begun, ambiguous)
+        self._look(belief, scan, np.isin(self._records.ids, owners), begun, ambiguous)
         if not self._config.housekeeping:
             return NOBODY
         self._weigh(belief, scan)
         return self._records.ids[(columns["log_odds"] < 0.0) | (extents[:, 1] - extents[:, 0] < shared.resolution_m)]
 
-    def _look(self, belief: Belief, scan: Scan, begun: Mapping[int, float], ambiguous: Int[np.ndarray, " a"]) -> None:
-        """Take in what the scan says of whether walls exist."""
+    def _look(
+        self,
+        belief: Belief,
+        scan: Scan,
+        seen: Bool[np.ndarray, " n"],
+        begun: Mapping[int, float],
+        ambiguous: Int[np.ndarray, " a"],
+    ) -> None:
+        """Take in what the scan says of whether walls exist; it shows those that are `seen`."""
         likely = self._records.rows(np.array(list(begun), dtype=np.int64))
         columns, ids = self._records.columns, self._records.ids
         lines = belief.anchors, belief.means, columns["extents"]
-        seen = columns["last_seen"] == self._scans
         unsure = np.isin(ids, ambiguous) | (not self._config.housekeeping)
         log_odds = columns["log_odds"]
         looked_at(belief.pose_world, scan, lines, seen, unsure, (log_odds, columns["place"]), self._odds)
@@ -160,4 +166,3 @@ class Extents:
         columns["observations"][row] += columns["observations"][other]
         columns["whole"][row] = 0
         columns["log_odds"][row] = max(columns["log_odds"][row], columns["log_odds"][other])
-        columns["last_seen"][row] = max(columns["last_seen"][row], columns["last_seen"][other])

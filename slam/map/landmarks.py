@@ -41,9 +41,8 @@ class Landmarks:
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""
         ids, extents = self.records.ids, self.records.columns["extents"]
-        misfits_m2 = self.profiles.misfits(ids, extents)
-        cov = self.reliability.off_line_cov(ids, extents, misfits_m2)
-        return self.extents.map(belief, misfits_m2 > 0.0, cov)
+        cov = self.reliability.off_line_cov(ids, extents, self.profiles.misfits(ids, extents))
+        return self.extents.map(belief, self.profiles.crooked(ids, extents), cov)
 
     def lack_of_fit(self, segments: Segments, owners: Int[np.ndarray, " s"]) -> Float[np.ndarray, "s 2 2"]:
         """Return how far the face that each segment shows may be from the line of its wall, of (alpha rad, r m)."""

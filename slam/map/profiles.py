@@ -9,7 +9,7 @@ offset and slope, in which the errors of both are, are eliminated, and what the 
 import math
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig
@@ -35,8 +35,9 @@ class Profiles:
         self._shared, self._pitch_m = shared, float(shared.resolution_m)
         self._least_ratio = -2.0 * math.log(shared.chance)
         self._records = Records() if records is None else records
-        # The number of the first place and the sums from there on; the likeliest break: place m, step m and turn rad.
-        self._records.declare(self._merge, profile=None, broken=np.zeros(3))
+        # The number of the first place and the sums from there on; the likeliest break: place m, step m and turn rad,
+        # and from where to where beams fell, m.
+        self._records.declare(self._merge, profile=None, broken=np.zeros(5))
 
     def see(self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
         """Add one scan; `owners` holds the wall of each segment, -1 for none."""
@@ -66,16 +67,27 @@ class Profiles:
             begin, sums = begin - before, np.pad(sums, ((0, 0), (before, after)))
         sums[:, first - begin : first - begin + more.shape[1]] += more
         at, step_m, turn_rad, ratio = surest(sums)
-        is_broken = ratio > self._least_ratio
         columns["profile"][row] = begin, sums
-        columns["broken"][row] = (self._pitch_m * (begin + at), step_m, turn_rad) if is_broken else 0.0
+        columns["broken"][row] = 0.0
+        if ratio > self._least_ratio:
+            places = self._pitch_m * np.array([begin + at, begin, begin + sums.shape[1] - 1])
+            columns["broken"][row] = places[0], step_m, turn_rad, places[1], places[2]
 
     def misfits(self, ids: Int[np.ndarray, " n"], extents: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
         """Return how far the faces of walls are off their lines, as variances across these, m^2.
 
-        `extents` are from and to along each, m from its anchor.
+        `extents` are from and to along each, m from its anchor. What beams have shown beyond them drew the line, too: a
+        wall that ends at its bend now was seen past it before.
         """
-        return misfits(self._records.columns["broken"][self._records.rows(ids)], extents)
+        broken = self._records.columns["broken"][self._records.rows(ids)]
+        low, high = np.minimum(extents[:, 0], broken[:, 3]), np.maximum(extents[:, 1], broken[:, 4])
+        return misfits(broken[:, :3].copy(), np.stack([low, high], axis=-1))
+
+    def crooked(self, ids: Int[np.ndarray, " n"], extents: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+        """Return which walls have a break between their ends: they stand for two faces."""
+        broken = self._records.columns["broken"][self._records.rows(ids)]
+        is_broken = np.any(broken[:, 1:3] != 0.0, axis=-1)
+        return is_broken & (extents[:, 0] < broken[:, 0]) & (broken[:, 0] < extents[:, 1])
 
     def _merge(self, merger: Merger) -> None:
         """Add the sums of the dropped wall at the nearest places of the kept one: half a pitch off at most."""

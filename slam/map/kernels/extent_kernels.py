@@ -73,46 +73,6 @@ def stretch(
 
 
 @compiled
-def uncover(
-    used: Int[np.ndarray, " m"],
-    owners: Int[np.ndarray, " s"],
-    ends: Float[np.ndarray, "s 2 2"],
-    end_kinds: Int[np.ndarray, "s 2"],
-    rows: Int[np.ndarray, " m"],
-    pose_world: Float[np.ndarray, "3"],
-    anchors: Float[np.ndarray, "n 2"],
-    means: Float[np.ndarray, "n 2"],
-    extents: Float[np.ndarray, "n 2"],
-    spacing: Float[np.ndarray, "n 2"],
-    overlaid: Int[np.ndarray, "n 2"],
-    margin_m: float,
-    contradictions: int,
-) -> None:
-    """Move an end back to the corner that scan after scan shows before it, if another wall runs on from there.
-
-    From afar a wall that turns by a few degrees is taken for one straight wall, and so reaches past the corner. Segment
-    `used[k]` is of the wall in row `rows[k]`; `overlaid` counts the scans in turn.
-    """
-    for side in range(2):
-        outward = -1 if side == 0 else 1
-        counts = overlaid[:, side].copy()
-        for k in range(len(rows)):
-            overlaid[rows[k], side] = 0
-        for k in range(len(rows)):
-            row, own, after = rows[k], used[k], (used[k] + outward) % len(ends)
-            corner = _along(ends[own, side], pose_world, anchors[row], means[row, 0])
-            far = _along(ends[after, side], pose_world, anchors[row], means[row, 0])
-            end = extents[row, side]
-            runs_on = end_kinds[own, side] == CORNER and end_kinds[after, 1 - side] == CORNER
-            runs_on = runs_on and outward * (far - end) > -margin_m
-            other = owners[after] >= 0 and owners[after] != owners[own]
-            if runs_on and other and outward * (end - corner) > margin_m:
-                overlaid[row, side] = counts[row] + 1
-                if overlaid[row, side] >= contradictions:
-                    extents[row, side], spacing[row, side] = corner, margin_m
-
-
-@compiled
 def note_whole(
     before: Float[np.ndarray, "n 2"],
     rows: Int[np.ndarray, " m"],
@@ -196,9 +156,7 @@ def take_in(
     ends: Float[np.ndarray, "s 2 2"],
     lines: Float[np.ndarray, "s 2"],
     end_kinds: Int[np.ndarray, "s 2"],
-    owners: Int[np.ndarray, " s"],
-    used: Int[np.ndarray, " m"],
-    rows: Int[np.ndarray, " m"],
+    rows: Int[np.ndarray, " s"],
     pose_world: Float[np.ndarray, "3"],
     anchors: Float[np.ndarray, "n 2"],
     means: Float[np.ndarray, "n 2"],
@@ -206,17 +164,13 @@ def take_in(
     extents: Float[np.ndarray, "n 2"],
     spacing: Float[np.ndarray, "n 2"],
     whole: Int[np.ndarray, " n"],
-    overlaid: Int[np.ndarray, "n 2"],
     margin_m: float,
-    contradictions: int,
 ) -> None:
-    """Stretch walls over the segments of one scan, note which are whole, and uncover corners before their ends."""
-    before, kinds = extents.copy(), end_kinds[used]
-    along, apart = seen_along(ends[used], lines[used], rows, pose_world, anchors, means, step_rad)
-    stretch(rows, along, apart, kinds, extents, spacing)
-    note_whole(before, rows, kinds, extents, whole, margin_m)
-    walls = pose_world, anchors, means
-    uncover(used, owners, ends, end_kinds, rows, *walls, extents, spacing, overlaid, margin_m, contradictions)
+    """Stretch the walls in `rows` over the segments of one scan, and note which are whole."""
+    before = extents.copy()
+    along, apart = seen_along(ends, lines, rows, pose_world, anchors, means, step_rad)
+    stretch(rows, along, apart, end_kinds, extents, spacing)
+    note_whole(before, rows, end_kinds, extents, whole, margin_m)
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""What becomes of a wall's extent, and of the wall, scan by scan: corners before its end, beams through it, looks."""
+"""What becomes of a wall's extent, and of the wall, scan by scan: beams through it, looks."""
 
 from dataclasses import replace
 
@@ -45,38 +45,8 @@ def see(walls, known, shown, owners, pose):
 
 
 BEFORE_BEND = [[0.0, 0.0], [2.0, 0.0]]
-BEYOND_BEND = [[2.0, 0.0], [3.5, 0.26]]
-TAKEN_FOR_STRAIGHT = [[0.0, 0.0], [2.6, 0.0]]
 WALL, BEHIND, FARTHER_BEHIND = ([[2.0 + behind, -1.0], [2.0 + behind, 1.0]] for behind in (0.0, 0.03, 0.05))
 """Seen from the origin: a beam that ends on the wall shows nothing of what lies more than 4 cm behind it."""
-
-
-@pytest.mark.parametrize("mirrored", [False, True])
-def test_an_end_past_a_corner_moves_back_once_two_scans_in_turn_show_the_next_wall_there(mirrored):
-    """From afar the two sides of a bend of 10 degrees are one wall, which then reaches 0.6 m past the corner."""
-
-    def laid(face):
-        return [[3.5 - x, y] for x, y in reversed(face)] if mirrored else face
-
-    pose = [1.7 if mirrored else 1.8, 1.0, 0.0]
-    before, beyond, straight = laid(BEFORE_BEND), laid(BEYOND_BEND), laid(TAKEN_FOR_STRAIGHT)
-    both, owners = ([beyond, before], [1, 0]) if mirrored else ([before, beyond], [0, 1])
-    side, outward = (0, -1.0) if mirrored else (1, 1.0)
-
-    def reaches_past(walls):
-        end = walls.map(belief_of([before, beyond][: len(walls.records)], pose)).ends_world[0, side]
-        return outward * (end - before[side])[0]
-
-    walls = Landmarks(*SETTINGS)
-    see(walls, [before], [straight], [0], pose)
-    assert reaches_past(walls) > 0.4
-    see(walls, [before, beyond], both, owners, pose)
-    assert reaches_past(walls) > 0.4
-    see(walls, [before, beyond], [straight], [0], pose)  # in between one scan shows none: the count begins anew
-    see(walls, [before, beyond], both, owners, pose)
-    assert reaches_past(walls) > 0.4
-    see(walls, [before, beyond], both, owners, pose)
-    assert abs(reaches_past(walls)) < 0.02
 
 
 @pytest.mark.parametrize(("behind", "observations", "is_kept"),

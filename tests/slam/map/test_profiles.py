@@ -128,22 +128,34 @@ def test_a_break_beyond_the_ends_of_a_wall_puts_it_off_by_nothing(place):
 
 @pytest.mark.parametrize("faces", [bent(np.deg2rad(0.5), 0.4), bent(np.deg2rad(-0.8), 0.4), stepped(0.012, 1.5)])
 def test_a_break_that_no_scan_shows_is_stated_as_far_off_as_it_puts_the_faces(faces):
-    """Whatever the robot believes its pose and the line to be."""
+    """Whatever the robot believes its pose and the line to be, and however little of the wall it counts as such now."""
     rng = np.random.default_rng(3)
-    ends = np.array([[-1.4, 1.4]])
-    at = np.linspace(*ends[0], 5_001)
     near = [face for face in faces if abs(face[0, 0] - face[1, 0]) > 0.5]
-    true = np.select([(at >= min(f[:, 0])) & (at <= max(f[:, 0])) for f in near],
-                     [np.interp(at, np.sort(f[:, 0]), f[np.argsort(f[:, 0]), 1]) for f in near])  # fmt: skip
-    off = true - np.polynomial.Polynomial.fit(at, true, 1)(at)
     for error, line in (((0.0, 0.0, 0.0), (0.0, 0.0)), ((0.02, -0.03, 0.01), (-0.005, 0.01))):
-        profiles, poses = Profiles(), random_poses(rng, 500, 1.2)
+        records = Records()
+        profiles, poses = Profiles(SharedConfig(), records), random_poses(rng, 500, 1.2)
         for pose, scan in zip(poses, scans(faces, poses, rng), strict=True):
             segments = extract(scan)
             (on_wall,) = np.nonzero(np.abs(np.sin(segments.lines[:, 0] + pose[2])) > 0.99)
             look(profiles, pose + np.array(error), scan, segments.take(on_wall), line)
-        (found,) = profiles.misfits(np.array([WALL]), ends)
+        ((first, sums),) = records.columns["profile"]
+        # Along a line of normal (0, 1) one walks towards -x.
+        at = -SharedConfig().resolution_m * np.linspace(first + sums.shape[1] - 1, first, 5_001)
+        true = np.select([(at >= min(f[:, 0])) & (at <= max(f[:, 0])) for f in near],
+                         [np.interp(at, np.sort(f[:, 0]), f[np.argsort(f[:, 0]), 1]) for f in near])  # fmt: skip
+        off = true - np.polynomial.Polynomial.fit(at, true, 1)(at)
+        (found,) = profiles.misfits(np.array([WALL]), np.array([[-1.0, 1.0]]))
         assert 0.5 < np.sqrt(found / (4.0 * np.mean(off**2))) < 1.5
+
+
+def test_a_wall_is_crooked_only_where_its_break_lies_between_its_ends():
+    records = Records()
+    profiles = Profiles(SharedConfig(), records)
+    walls = records.rows(np.arange(4))
+    records.columns["broken"][walls[1:]] = [[0.5, 0.02, 0, -2, 2], [0.5, 0, 0.1, -2, 2], [-2.0, 0.02, 0.1, -2, 2]]
+    extents = np.array([[-1.0, 1.0]] * 4)
+    assert profiles.crooked(np.arange(4), extents).tolist() == [False, True, True, False]
+    assert profiles.crooked(np.arange(4), extents - [[0.0, 0.6]]).tolist() == [False] * 4
 
 
 @pytest.mark.parametrize("seed", range(3))
