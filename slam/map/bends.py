@@ -1,7 +1,8 @@
 """Where a wall bends: two walls whose lines cross, and which both reach past the crossing, end there.
 
 A scan from afar shows one line over a slight bend. Whichever of the two walls it is matched to then reaches past the
-bend, beside the other, and no beam ever passes through it to show that it ends before.
+bend, beside the other, and no beam ever passes through it to show that it ends before. But of two faces that cross, one
+hides the other.
 """
 
 import numpy as np
@@ -9,7 +10,7 @@ from jaxtyping import Float, Int
 
 from ..estimation.shared import SharedConfig
 from ..geometry.lines import directions
-from .kernels.bend_kernels import Bounds, overlapping
+from .kernels.bend_kernels import overlapping
 from .merging import same_line
 from .stochastic_map import StochasticMap
 
@@ -23,9 +24,9 @@ def ends_at_bends(
     probability level `one_wall` meet nowhere: they are left to be merged. The wall that runs up to the bend is first.
     """
     near = np.flatnonzero(walls.established & ~walls.tentative & (walls.distances_m < range_m))
-    bounds = Bounds(float(shared.resolution_m), float(shared.long_m), float(shared.beside_m), float(shared.sharp_rad))
     belief, alpha = walls.belief, walls.belief.means[:, 0].copy()
-    rows, points_world = overlapping(near, alpha, walls.ends_world, bounds)
+    bounds = float(shared.resolution_m), float(shared.sharp_rad)
+    rows, points_world = overlapping(near, alpha, walls.ends_world, *bounds)
     if not len(rows):
         return rows, points_world
     some = np.unique(rows)

@@ -1,7 +1,6 @@
 """Walls that run on past the place where their lines cross: the loops of `bends`."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -9,22 +8,18 @@ from jaxtyping import Float, Int
 from ...geometry.compiled import compiled
 
 
-class Bounds(NamedTuple):
-    """What two walls at a bend are: those of `SharedConfig` that the loops read."""
-
-    resolution_m: float
-    overlap_m: float
-    beside_m: float
-    most_rad: float
-
-
 @compiled
 def overlapping(
-    rows: Int[np.ndarray, " k"], alpha: Float[np.ndarray, " n"], ends: Float[np.ndarray, "n 2 2"], bounds: Bounds
+    rows: Int[np.ndarray, " k"],
+    alpha: Float[np.ndarray, " n"],
+    ends: Float[np.ndarray, "n 2 2"],
+    resolution_m: float,
+    most_rad: float,
 ) -> tuple[Int[np.ndarray, "p 2"], Float[np.ndarray, "p 2"]]:
     """Return the pairs of `rows`, the wall before a bend first, which reach past where their lines cross; and where.
 
-    They overlap by more than ends are uncertain, there, and lie beside each other where the first ends.
+    They overlap by more than ends are uncertain, neither beside the whole of the other, and turn by less than
+    `most_rad`: there one face would hide the other past the crossing.
     """
     pairs, points, count = np.empty((8, 2), np.int64), np.empty((8, 2)), 0
     for before in rows:
@@ -34,15 +29,15 @@ def overlapping(
         for after in rows:
             east, north = ends[after, 0, 0] - x, ends[after, 0, 1] - y
             gap, across = tx * east + ty * north, ty * east - tx * north
-            beside = -min(length, bounds.overlap_m) < gap < -bounds.resolution_m and abs(across) < bounds.beside_m
-            if not beside or tx * (ends[after, 1, 0] - x) + ty * (ends[after, 1, 1] - y) <= 0.0:
+            overlap = -length < gap < -resolution_m
+            if not overlap or tx * (ends[after, 1, 0] - x) + ty * (ends[after, 1, 1] - y) <= 0.0:
                 continue
             off = alpha[after] - alpha[before]
             turn = math.atan2(math.sin(off), math.cos(off))
-            if not 0.0 < abs(turn) < bounds.most_rad:
+            if not 0.0 < abs(turn) < most_rad:
                 continue
             crossing = gap + across / math.tan(turn)
-            if gap - bounds.resolution_m < crossing < bounds.resolution_m:
+            if gap - resolution_m < crossing < resolution_m:
                 if count == len(pairs):
                     pairs, points = np.concatenate((pairs, pairs)), np.concatenate((points, points))
                 pairs[count, 0], pairs[count, 1] = before, after
