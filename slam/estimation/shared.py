@@ -44,12 +44,11 @@ class SharedConfig:
     """Overlap from which two walls beside each other may be one, and length from which a wall shows how the map has
     moved."""
     known_rad: Spread = float(np.deg2rad(1.0))
-    """Standard deviation up to which the angle between two walls counts as known, and smallest angle of a
-    bend whose sides join though they overlap."""
+    """Standard deviation up to which the angle between two walls counts as known."""
     straight_rad: Angle = float(np.deg2rad(5.0))
     """Angle below which two walls may be one, or one may continue the other."""
     sharp_rad: Angle = float(np.deg2rad(30.0))
-    """Angle above which two walls meet in a corner: they join only where their ends are near."""
+    """Angle below which two walls that cross meet at a bend, and end there."""
     noise_sigmas: Sigmas = 4.0
     """Deviation, in standard deviations, above which a beam does not belong to a line, or to a wall."""
     outlier_sigmas: Sigmas = 3.0

@@ -58,9 +58,9 @@ def connect(
     if not len(rows):
         return ()
     ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
-    pairs = near_ends(ends, max(shared.thickness_m, shared.door_m, shared.long_m))
+    pairs = near_ends(ends, float(max(shared.thickness_m, shared.door_m)))
     both_aside = _both_aside(pairs, ids, set_aside)
-    gaps, allowed = joinable(pairs, ends, lines[:, 0].copy(), walls.established[rows], both_aside, _reach(shared))
+    gaps, allowed = joinable(pairs, ends, lines[:, 0].copy(), both_aside, _reach(shared))
     successor = successors(pairs, gaps, allowed, len(rows))
     before = np.flatnonzero(successor >= 0)
     after = successor[before]
@@ -98,10 +98,6 @@ def _reach(shared: SharedConfig) -> Reach:
         float(shared.door_m),
         float(np.cos(shared.straight_rad)),
         float(shared.within_m),
-        float(shared.long_m),
-        float(shared.beams_m),
-        float(np.cos(shared.known_rad)),
-        float(np.cos(shared.sharp_rad)),
     )
 
 

@@ -11,7 +11,7 @@ from ..geometry.circles import cov_of_rounding
 from .kernels import wall_kernels
 
 ESTABLISHED = 10
-"""Ends of walls seen this often may join at a bend past which both reach."""
+"""Walls seen this often end at a bend past which they reach."""
 
 
 @dataclass(frozen=True)

@@ -27,14 +27,6 @@ class Reach(NamedTuple):
     straight_reach_m: float
     """... and join only this near, or beside each other: two rooms' walls on one line face each other across the end of
     the wall between, as far apart as that is thick."""
-    overlap_m: float
-    """Largest overlap of the two sides of a bend, both established: within the noise each reaches past it, ..."""
-    beside_m: float
-    """... where it lies no farther than this from the other."""
-    least_bend_cosine: float
-    """What such a bend turns: less, and it may be a duplicate; ..."""
-    most_bend_cosine: float
-    """... more, and beams tell where it is."""
 
 
 @compiled
@@ -69,7 +61,6 @@ def joinable(
     pairs: Int[np.ndarray, "k 2"],
     ends: Float[np.ndarray, "n 2 2"],
     alpha: Float[np.ndarray, " n"],
-    often: Bool[np.ndarray, " n"],
     both_aside: Bool[np.ndarray, " k"],
     reach: Reach,
 ) -> tuple[Float[np.ndarray, " k"], Bool[np.ndarray, " k"]]:
@@ -83,30 +74,8 @@ def joinable(
         straight = math.cos(alpha[head] - alpha[tail]) > reach.straight_cosine
         near = gap <= (reach.set_aside_reach_m if both_aside[k] else reach.reach_m)
         near = near and (not straight or gap <= reach.straight_reach_m or across > BESIDE_SHARE * gap)
-        overlap = gap <= reach.overlap_m and often[head] and often[tail]
-        overlap = overlap and overlap_at_a_bend(ends[head], ends[tail], alpha[head], alpha[tail], reach)
-        gaps[k], allowed[k] = gap, near or overlap
+        gaps[k], allowed[k] = gap, near
     return gaps, allowed
-
-
-@compiled
-def overlap_at_a_bend(
-    before: Float[np.ndarray, "2 2"],
-    after: Float[np.ndarray, "2 2"],
-    alpha_before: float,
-    alpha_after: float,
-    reach: Reach,
-) -> bool:
-    """Return whether walls are the sides of a bend past which they reach, each along the other, by their ends."""
-    tx, ty = -math.sin(alpha_before), math.cos(alpha_before)
-    ux, uy = -math.sin(alpha_after), math.cos(alpha_after)
-    x, y = before[HEAD, 0] - after[TAIL, 0], before[HEAD, 1] - after[TAIL, 1]
-    goes_on = tx * (after[HEAD, 0] - before[HEAD, 0]) + ty * (after[HEAD, 1] - before[HEAD, 1]) > 0.0
-    goes_on = goes_on and ux * (after[TAIL, 0] - before[TAIL, 0]) + uy * (after[TAIL, 1] - before[TAIL, 1]) > 0.0
-    turn = math.cos(alpha_after - alpha_before)
-    bends = turn < reach.least_bend_cosine and turn > reach.most_bend_cosine
-    beside = abs(ty * x - tx * y) <= reach.beside_m and abs(uy * x - ux * y) <= reach.beside_m
-    return goes_on and tx * x + ty * y > 0.0 and bends and beside
 
 
 @compiled

@@ -17,7 +17,7 @@ REACH = SharedConfig().thickness_m
 ASIDE_REACH = SharedConfig().door_m
 
 
-def map_of(segments, ids=None, tentative=None, seen=20):
+def map_of(segments, ids=None, tentative=None):
     """Return a map whose walls are these segments (free side on the left), anchored in their middles."""
     count = len(segments)
     lines, anchors = through(segments), segments.mean(axis=1)
@@ -33,7 +33,7 @@ def map_of(segments, ids=None, tentative=None, seen=20):
     belief = Belief(np.zeros(3), np.eye(3), numbers, anchors, means, query)
     marks = np.zeros(count, dtype=bool) if tentative is None else tentative
     return StochasticMap(
-        belief, np.stack([-half, half], axis=-1), np.full(count, seen), marks, np.zeros(count, dtype=bool)
+        belief, np.stack([-half, half], axis=-1), np.full(count, 20), marks, np.zeros(count, dtype=bool)
     )
 
 
@@ -219,45 +219,6 @@ def test_the_nearer_of_two_tails_is_joined():
 def test_an_empty_map_has_no_chains():
     assert connect(map_of(np.zeros((0, 2, 2)))) == ()
     assert connect(map_of(gap_of(0.0), tentative=np.array([True, True]))) == ()
-
-
-def bent(turn_deg, overlap_m, aside_m=0.0):
-    """Return two walls, the second of which turns by so much at (2, 0), and both of which reach past that place."""
-    turn, half = np.deg2rad(turn_deg), 0.5 * overlap_m
-    along = np.array([np.cos(turn), np.sin(turn)])
-    before = [[0.0, 0.0], [2.0 + half, 0.0]]
-    return np.array([before, np.array([2.0, aside_m]) + np.array([-half * along, 2.0 * along])])
-
-
-@pytest.mark.parametrize(("turn_deg", "overlap_m"), [(2.0, 0.9), (3.0, 0.6), (-6.0, 0.4), (11.0, 0.3), (-20.0, 0.15)])
-def test_the_sides_of_a_bend_join_though_each_reaches_past_it(turn_deg, overlap_m):
-    """What lies within the noise of the other: 4 cm."""
-    walls = bent(turn_deg, overlap_m)
-    for both in (walls, walls[::-1]):
-        (chain,) = connect(map_of(both))
-        assert len(chain.walls) == 2
-        np.testing.assert_allclose(chain.corners_world, [[2.0, 0.0]], atol=0.04)
-
-
-@pytest.mark.parametrize(
-    "walls",
-    [
-        bent(6.0, 1.2),
-        bent(6.0, 0.8),
-        bent(6.0, 0.4, aside_m=0.1),
-        bent(0.5, 0.4),
-        bent(40.0, 0.25),
-        np.array([[[0.0, 0.0], [3.0, 0.0]], [[1.0, -0.02], [2.5, 0.02]]]),
-        np.array([[[0.0, 0.0], [2.0, 0.0]], [[4.0, 0.1], [1.8, -0.01]]]),
-    ],
-)
-def test_walls_that_lie_beside_each_other_are_no_bend(walls):
-    """They overlap too far, or too far off, may be one, turn so much that beams tell, or do not run on, or run back."""
-    assert len(connect(map_of(walls))) == 2
-
-
-def test_a_wall_seen_a_few_times_joins_no_side_of_a_bend_that_it_may_lie_across():
-    assert len(connect(map_of(bent(6.0, 0.4), seen=5))) == 2
 
 
 @pytest.mark.parametrize(
