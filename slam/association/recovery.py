@@ -19,7 +19,7 @@ from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..geometry.poses import compose, inverse
 from ..geometry.quantities import Deviation, Number, Share, Spread
-from ..map.kernels.ray_evidence import ray_evidence
+from ..map.ray_evidence import ray_evidence
 from ..map.stochastic_map import StochasticMap
 from ..odometry.diagnosis import DiagnosisConfig
 from ..robot import Odometry, Scan
@@ -137,9 +137,9 @@ def is_contradicted(scan: Scan, walls: StochasticMap, config: RecoveryConfig) ->
     """Return whether most of the beams towards known walls go through them."""
     belief = walls.belief
     inside_m = config.shared.face_m
-    evidence = ray_evidence(scan, belief.pose_world, belief.anchors, belief.means, inside_m)
-    inside = (evidence.along > walls.extents[:, :1] + inside_m) & (evidence.along < walls.extents[:, 1:] - inside_m)
-    through, met = np.any(evidence.passes & inside, axis=0), np.any(evidence.hits & inside, axis=0)
+    rays = ray_evidence(scan, belief.pose_world, belief.anchors, belief.means)
+    inside = rays.between(walls.extents, inside_m)
+    through, met = (np.any(beams & inside, axis=0) for beams in (rays.passes(inside_m), rays.hits(inside_m)))
     towards = np.count_nonzero(through | met)
     return bool(towards >= config.least_beams and np.count_nonzero(through) > config.least_share * towards)
 

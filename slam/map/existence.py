@@ -16,8 +16,9 @@ from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..geometry.quantities import Distance, Probability
 from ..robot import RobotSpec, Scan, of_robot
-from .kernels.existence_kernels import Odds, crossing, look
+from .kernels.existence_kernels import Odds, look
 from .kernels.few_beams_kernels import Same, distances, lines_of, paired
+from .ray_evidence import ray_evidence
 
 JUST_BEGUN = np.full(2, np.nan)
 """The place of the last look at a wall that begins in this scan."""
@@ -89,25 +90,6 @@ def _log(probability: float) -> float:
     return log(probability) if probability > 0.0 else -inf
 
 
-def looked_at(
-    pose_world: Float[np.ndarray, "3"],
-    scan: Scan,
-    lines: tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]],
-    seen: Bool[np.ndarray, " n"],
-    unsure: Bool[np.ndarray, " n"],
-    columns: tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 2"]],
-    odds: Odds,
-) -> None:
-    """Take one scan into the log odds and the places of the last looks, in place.
-
-    `lines` are anchors, means (alpha rad, d m) and extents, m, world frame; `seen` are those that the scan
-    shows; of the others it may show those that are `unsure`, and says nothing of them.
-    """
-    beams = crossing(scan.bearings_rad, scan.passed_m, float(scan.range_max_m), pose_world, *lines, odds.margin_m)
-    beams[unsure] = 0
-    look(pose_world, beams, seen, *columns, odds)
-
-
 class LandmarkCandidates:
     """The lines of few beams that may become walls: door ends, pilasters, and lines across corners.
 
@@ -138,10 +120,11 @@ class LandmarkCandidates:
         """
         lines, known = lines_of(pose_world, segments.lines, segments.cov, segments.ends), self._lines
         line_of = paired(distances(lines, known, self._same))
-        seen, unsure = np.isin(np.arange(len(known)), line_of), np.zeros(len(known), dtype=bool)
         anchors, alpha_rad, half_m = known[:, 1:3].copy(), known[:, 0], known[:, 5:]
-        walls = anchors, np.column_stack([alpha_rad, np.zeros(len(known))]), half_m * [-1.0, 1.0]
-        looked_at(pose_world, scan, walls, seen, unsure, (self._log_odds, self._places), self._odds)
+        rays = ray_evidence(scan, pose_world, anchors, np.column_stack([alpha_rad, np.zeros(len(known))]))
+        beams = rays.reaching(half_m * [-1.0, 1.0], self._odds.margin_m)
+        seen = np.isin(np.arange(len(known)), line_of)
+        look(pose_world, beams, seen, self._log_odds, self._places, self._odds)
         due = self._log_odds > self._config.believed
         believed = np.flatnonzero((line_of >= 0) & due[line_of]) if len(known) else np.zeros(0, dtype=np.int64)
         log_odds = self._log_odds[line_of[believed]]

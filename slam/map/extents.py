@@ -11,9 +11,11 @@ from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..robot import Scan
 from .displacement import across, along
-from .existence import JUST_BEGUN, ExistenceConfig, looked_at
+from .existence import JUST_BEGUN, ExistenceConfig
 from .kernels import wall_kernels
-from .kernels.extent_kernels import take_in, weigh
+from .kernels.existence_kernels import look
+from .kernels.extent_kernels import cut_back, take_in
+from .ray_evidence import RayEvidence, ray_evidence
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
 from .stochastic_map import StochasticMap
@@ -123,36 +125,30 @@ class Extents:
         kept = extents, columns["spacing"], columns["whole"]
         take_in(*seen, *lines, scan.step_rad, *kept, float(shared.thickness_m))
         columns["observations"][rows] += 1  # of a wall with two segments, too, by one: summed before it is stored
-        self._look(belief, scan, np.isin(self._records.ids, owners), begun, ambiguous)
+        beams = np.zeros(len(extents), dtype=np.int64)
+        if self._config.housekeeping:
+            ends_world = wall_kernels.ends_world(belief.anchors, belief.means, extents)
+            near = np.flatnonzero(wall_kernels.distances(belief.pose_world[:2], ends_world) < scan.range_max_m)
+            rays = ray_evidence(scan, belief.pose_world, belief.anchors[near], belief.means[near])
+            beams[near] = rays.reaching(extents[near], self._odds.margin_m)
+            beams[np.isin(self._records.ids, ambiguous)] = 0
+            self._cut_back(rays, near)
+        shown, log_odds = np.isin(self._records.ids, owners), columns["log_odds"]
+        look(belief.pose_world, beams, shown, log_odds, columns["place"], self._odds)
+        begins = self._records.rows(np.array(list(begun), dtype=np.int64))
+        log_odds[begins] = np.maximum(log_odds[begins], list(begun.values()))
         if not self._config.housekeeping:
             return NOBODY
-        self._weigh(belief, scan)
-        return self._records.ids[(columns["log_odds"] < 0.0) | (extents[:, 1] - extents[:, 0] < shared.resolution_m)]
+        return self._records.ids[(log_odds < 0.0) | (extents[:, 1] - extents[:, 0] < shared.resolution_m)]
 
-    def _look(
-        self,
-        belief: Belief,
-        scan: Scan,
-        seen: Bool[np.ndarray, " n"],
-        begun: Mapping[int, float],
-        ambiguous: Int[np.ndarray, " a"],
-    ) -> None:
-        """Take in what the scan says of whether walls exist; it shows those that are `seen`."""
-        likely = self._records.rows(np.array(list(begun), dtype=np.int64))
-        columns, ids = self._records.columns, self._records.ids
-        lines = belief.anchors, belief.means, columns["extents"]
-        unsure = np.isin(ids, ambiguous) | (not self._config.housekeeping)
-        log_odds = columns["log_odds"]
-        looked_at(belief.pose_world, scan, lines, seen, unsure, (log_odds, columns["place"]), self._odds)
-        log_odds[likely] = np.maximum(log_odds[likely], list(begun.values()))
-
-    def _weigh(self, belief: Belief, scan: Scan) -> None:
+    def _cut_back(self, rays: RayEvidence, near: Int[np.ndarray, " m"]) -> None:
         """Cut walls back where beams pass through them."""
         columns, shared = self._records.columns, self._config.shared
-        beams = scan.bearings_rad, scan.ranges_m, scan.passed_m
-        kept = columns["extents"], columns["spacing"], columns["against"]
-        limits = float(shared.thickness_m), float(shared.far_m), shared.scans
-        weigh(float(scan.range_max_m), *beams, belief.pose_world, belief.anchors, belief.means, *kept, *limits)
+        margin_m = float(shared.thickness_m)
+        seen = near, rays.along, rays.hits(margin_m), rays.passes(margin_m)
+        cut_back(
+            *seen, columns["extents"], columns["spacing"], columns["against"], margin_m, shared.far_m, shared.scans
+        )
 
     def _merge(self, merger: Merger) -> None:
         """Give the kept wall the extent of both."""

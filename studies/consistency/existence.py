@@ -29,8 +29,8 @@ from chainslam.slam.association.matching import MatchingConfig
 from chainslam.slam.estimation.gates import gate_level
 from chainslam.slam.extraction.config import ExtractionConfig
 from chainslam.slam.map.existence import JUST_BEGUN, ExistenceConfig
-from chainslam.slam.map.kernels.existence_kernels import crossing
 from chainslam.slam.map.kernels.few_beams_kernels import Same, distances, lines_of
+from chainslam.slam.map.ray_evidence import ray_evidence
 
 from ..runner.command import run_study
 from .extraction import PLANS
@@ -163,8 +163,7 @@ def crossed(
 ) -> Int[np.ndarray, " n"]:
     """Return how many beams of a step's scan reach lines, world frame."""
     scan, pose_world = step.scan, step.map.belief.pose_world
-    lines = anchors, means, extents
-    return crossing(scan.bearings_rad, scan.passed_m, float(scan.range_max_m), pose_world, *lines, ODDS.margin_m)
+    return ray_evidence(scan, pose_world, anchors, means).reaching(extents, ODDS.margin_m)
 
 
 def table(counts: "Counter[tuple[str, *Kind]]") -> Table:

@@ -99,7 +99,7 @@ MAP = (
          ("slam.map.kernels.reliability_kernels", "turn = heading_rad if is_tentative[k] else 0.0", "turn = 0.0")),
     _off("existence", "walls are tentative at first, and removed where scans that should show them do not",
          ("slam.map.extents", '"log_odds"] <= self._config.existence.believed', '"log_odds"] < -np.inf'),
-         ("slam.map.extents", '(columns["log_odds"] < 0.0) |', '(columns["log_odds"] < -np.inf) |')),
+         ("slam.map.extents", '[(log_odds < 0.0) |', '[(log_odds < -np.inf) |')),
     _off("one look a place", "all scans from one place count once for and against a wall",
          ("slam.map.kernels.existence_kernels", "places[n, 1]) < odds.apart_m:", "places[n, 1]) < 0.0:")),
     _off("candidates", "lines of few beams become walls once they were seen from several places",

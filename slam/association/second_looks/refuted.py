@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ...estimation.mounting import scanner_poses
-from ...map.kernels.ray_evidence import ray_evidence
+from ...map.ray_evidence import ray_evidence
 from ...robot import Scan, ScannerSpec
 from .solve import Unknowns
 
@@ -38,12 +38,10 @@ def voted(
     Beams that end before it say nothing, nor do those beside its ends.
     """
     pro, contra = np.zeros((2, len(at.lines)), dtype=np.int64)
-    low, high = reach[:, :1] + margin_m, reach[:, 1:] - margin_m
     for scan, pose in zip(rays.scans, scanner_poses(at.poses, rays.scanner), strict=False):
-        seen = ray_evidence(scan, pose, at.anchors, at.lines, margin_m)
-        inside = (seen.along > low) & (seen.along < high)
-        ended = np.count_nonzero(seen.hits & inside, axis=1)
-        passed = np.count_nonzero(seen.passes & inside, axis=1)
+        seen = ray_evidence(scan, pose, at.anchors, at.lines)
+        inside = seen.between(reach, margin_m)
+        ended, passed = (np.count_nonzero(x & inside, axis=1) for x in (seen.hits(margin_m), seen.passes(margin_m)))
         pro += ended > passed
         contra += passed > ended
     return pro, contra

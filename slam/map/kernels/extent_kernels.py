@@ -9,8 +9,6 @@ from ...extraction.segments import EndKind
 from ...geometry.compiled import compiled
 from ...geometry.line_kernels import GRAZING
 from ...geometry.numerics import TINY
-from .ray_kernels import ray_evidence
-from .wall_kernels import distances, ends_world
 
 CORNER, OCCLUDED = int(EndKind.CORNER), int(EndKind.OCCLUDED)
 
@@ -171,27 +169,3 @@ def take_in(
     along, apart = seen_along(ends, lines, rows, pose_world, anchors, means, step_rad)
     stretch(rows, along, apart, end_kinds, extents, spacing)
     note_whole(before, rows, end_kinds, extents, whole, margin_m)
-
-
-@compiled
-def weigh(
-    range_m: float,
-    bearings_rad: Float[np.ndarray, " k"],
-    ranges_m: Float[np.ndarray, " k"],
-    passed_m: Float[np.ndarray, " k"],
-    pose_world: Float[np.ndarray, "3"],
-    anchors: Float[np.ndarray, "w 2"],
-    means: Float[np.ndarray, "w 2"],
-    extents: Float[np.ndarray, "w 2"],
-    spacing: Float[np.ndarray, "w 2"],
-    against: Int[np.ndarray, " w"],
-    margin_m: float,
-    trim_m: float,
-    twice: int,
-) -> None:
-    """Hold the walls in range against the beams that pass through them."""
-    near = np.flatnonzero(distances(pose_world[:2], ends_world(anchors, means, extents)) < range_m)
-    along, hits, passes = ray_evidence(
-        bearings_rad, ranges_m, passed_m, pose_world, anchors[near], means[near], margin_m
-    )
-    cut_back(near, along, hits, passes, extents, spacing, against, margin_m, trim_m, twice)

@@ -1,40 +1,34 @@
-"""What beams say about walls: the loop of `ray_evidence`."""
+"""Where beams cross the lines of walls: the loop of `ray_evidence`."""
 
 import math
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from ...geometry.compiled import compiled
 from ...geometry.line_kernels import GRAZING, lines_from
 
 
 @compiled
-def ray_evidence(
+def crossings(
     bearings_rad: Float[np.ndarray, " k"],
-    ranges_m: Float[np.ndarray, " k"],
     passed_m: Float[np.ndarray, " k"],
     pose_world: Float[np.ndarray, "3"],
     anchors: Float[np.ndarray, "n 2"],
     means: Float[np.ndarray, "n 2"],
-    margin_m: float,
-) -> tuple[Float[np.ndarray, "n k"], Bool[np.ndarray, "n k"], Bool[np.ndarray, "n k"]]:
-    """Return where beams cross lines (NaN where they do not), which end on them, and which go on beyond them."""
-    n, k = len(means), len(bearings_rad)
-    along, hits, passes = np.full((n, k), np.nan), np.zeros((n, k), np.bool_), np.zeros((n, k), np.bool_)
+) -> tuple[Float[np.ndarray, "n k"], Float[np.ndarray, "n k"]]:
+    """Return where beams cross lines, and how far they go on beyond them, m across these; NaN where they do not."""
+    along, across = np.full((2, len(means), len(bearings_rad)), np.nan)
     x, y = np.cos(bearings_rad), np.sin(bearings_rad)
     lines, feet = lines_from(pose_world, anchors, means)
-    for line in range(n):
+    for line in range(len(lines)):
         nx, ny, r = math.cos(lines[line, 0]), math.sin(lines[line, 0]), lines[line, 1]
         if r <= 0.0:
             continue
-        for beam in range(k):
+        for beam in range(len(x)):
             cosine = x[beam] * nx + y[beam] * ny
-            if cosine <= GRAZING:
-                continue
-            distance = r / cosine
-            along[line, beam] = feet[line] + distance * (y[beam] * nx - x[beam] * ny)
-            across = (passed_m[beam] - distance) * cosine
-            hits[line, beam] = math.isfinite(ranges_m[beam]) and abs(across) <= margin_m
-            passes[line, beam] = across > margin_m
-    return along, hits, passes
+            if cosine > GRAZING:
+                distance = r / cosine
+                along[line, beam] = feet[line] + distance * (y[beam] * nx - x[beam] * ny)
+                across[line, beam] = (passed_m[beam] - distance) * cosine
+    return along, across

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.geometry.lines import normals, through
-from chainslam.slam.map.existence import JUST_BEGUN, NOWHERE, ExistenceConfig, log_odds, looked_at
-from chainslam.slam.map.kernels.existence_kernels import Odds, crossing, look
+from chainslam.slam.map.existence import JUST_BEGUN, NOWHERE, ExistenceConfig, log_odds
+from chainslam.slam.map.kernels.existence_kernels import Odds, look
+from chainslam.slam.map.ray_evidence import ray_evidence
 from chainslam.slam.robot import Scan
 
 CONFIG = ExistenceConfig()
 ODDS = CONFIG.odds(5)
 ORIGIN = np.zeros(3)
-SURE, UNSURE = np.zeros(1, dtype=bool), np.ones(1, dtype=bool)
 WALL = [[1.0, -0.5], [1.0, 0.5]]
 seeds = st.integers(0, 2**32)
 
@@ -38,8 +38,9 @@ def lines_of(faces):
 
 def beams_on(face, shown, pose=ORIGIN):
     scan = scan_of(shown, pose)
-    reach = scan.bearings_rad, scan.passed_m, scan.range_max_m, np.asarray(pose, dtype=float)
-    return int(crossing(*reach, *lines_of([face]), ODDS.margin_m)[0])
+    anchors, means, extents = lines_of([face])
+    rays = ray_evidence(scan, np.asarray(pose, dtype=float), anchors, means)
+    return int(rays.reaching(extents, ODDS.margin_m)[0])
 
 
 def test_beams_that_end_on_a_wall_or_go_on_beyond_it_reach_it_and_no_others():
@@ -87,15 +88,13 @@ def test_shares_that_are_certain_decide_by_one_look():
     assert replace(CONFIG, over_faces=0.0).believed == np.inf == log_odds(1.0) == -log_odds(0.0)
 
 
-def looks(shown, places, config=CONFIG, unsure=SURE):
+def looks(shown, places, config=CONFIG, is_unsure=False):
     """Return the log odds of `WALL` after looks at faces from places; it is seen where it is one of the faces."""
-    odds = np.array([CONFIG.believed])
-    columns = odds, np.tile(NOWHERE, (1, 1))
+    odds, last = np.array([CONFIG.believed]), np.tile(NOWHERE, (1, 1))
     for faces, place in zip(shown, places, strict=True):
         pose = np.array([*place, 0.0])
-        looked_at(
-            pose, scan_of(faces, pose), lines_of([WALL]), np.array([WALL in faces]), unsure, columns, config.odds(5)
-        )
+        beams = np.array([0 if is_unsure else beams_on(WALL, faces, pose)])
+        look(pose, beams, np.array([WALL in faces]), odds, last, config.odds(5))
     return float(odds[0])
 
 
@@ -104,7 +103,7 @@ def test_two_faces_in_its_place_undo_a_wall_and_from_one_place_they_are_one_look
     faces = [[[1.0, -0.5], [1.3, 0.0]], [[1.3, 0.0], [1.0, 0.5]]]
     moving = [(0.0, 0.1 * k) for k in range(2)]
     assert looks([faces] * 2, moving) < 0.0 < looks([faces] * 2, [(0.0, 0.0)] * 2)
-    assert looks([faces] * 2, moving, unsure=UNSURE) == CONFIG.believed
+    assert looks([faces] * 2, moving, is_unsure=True) == CONFIG.believed
 
 
 def test_a_wall_that_was_seen_for_long_is_no_surer_than_chance_lets_it_be_and_can_be_undone():

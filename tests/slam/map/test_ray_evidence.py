@@ -10,7 +10,7 @@ from chainslam.slam.extraction.extract import extract
 from chainslam.slam.extraction.segments import EndKind
 from chainslam.slam.extraction.visible_extent import sure_pieces
 from chainslam.slam.geometry.lines import normals, through
-from chainslam.slam.map.kernels.ray_evidence import ray_evidence
+from chainslam.slam.map.ray_evidence import ray_evidence
 from chainslam.slam.robot import Scan
 
 
@@ -43,7 +43,8 @@ def test_each_beam_hits_passes_or_falls_short_as_a_ray_traced_alone_does(seed):
     segments, margin = rng.uniform([0, 0], [5, 4], (6, 2, 2)), 0.07
     lines, anchors = through(segments), segments.mean(axis=1)
     means = np.column_stack([lines[:, 0], np.einsum("nd,nd->n", normals(lines[:, 0]), segments[:, 0] - anchors)])
-    found = ray_evidence(scan, pose, anchors, means, margin)
+    found = ray_evidence(scan, pose, anchors, means)
+    hits, passes = found.hits(margin), found.passes(margin)
     compared = 0
     for i, (alpha, r) in enumerate(lines):
         n, t = np.array([np.cos(alpha), np.sin(alpha)]), np.array([-np.sin(alpha), np.cos(alpha)])
@@ -54,8 +55,8 @@ def test_each_beam_hits_passes_or_falls_short_as_a_ray_traced_alone_does(seed):
             crossing = shapely.intersection(shapely.LineString([pose[:2], pose[:2] + 60 * beam]), long)
             if beam @ n < 0.06 or r - n @ pose[:2] < 0.03 or crossing.is_empty:
                 if beam @ n < 0.0:  # seen from behind, or leading away
-                    assert not found.hits[i, k]
-                    assert not found.passes[i, k]
+                    assert not hits[i, k]
+                    assert not passes[i, k]
                 continue
             at = np.array([crossing.x, crossing.y])
             assert found.along[i, k] == pytest.approx(t @ (at - anchors[i]), abs=1e-6)
@@ -66,8 +67,8 @@ def test_each_beam_hits_passes_or_falls_short_as_a_ray_traced_alone_does(seed):
             across = end @ n - r
             if abs(abs(across) - margin) < 1e-9:
                 continue
-            assert found.passes[i, k] == (across > margin)
-            assert found.hits[i, k] == (np.isfinite(here) and abs(across) <= margin)
+            assert passes[i, k] == (across > margin)
+            assert hits[i, k] == (np.isfinite(here) and abs(across) <= margin)
             compared += 1
     assert compared > 20
 
