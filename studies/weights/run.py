@@ -21,7 +21,7 @@ from chainslam.slam.geometry.compiled import cache
 from ..runner import rows
 from ..runner.command import run_study
 from .mechanisms import BASELINE, MECHANISMS, Mechanism
-from .table import ROWS, SCORES, scores_of
+from .table import ROWS, SCORES, newest, scores_of
 
 PlanSet = Literal["apartments", "schools"]
 NAMED: dict[PlanSet, tuple[str, int]] = {"apartments": ("lifull_*", 5_000), "schools": ("cml_*", 1_500)}
@@ -46,7 +46,7 @@ class WeightsRun:
     jobs: int = 2
     """Number of processes."""
     out: Path = ROWS
-    """A line of JSON for each mechanism and set. Lines of other code are dropped."""
+    """A line of JSON for each mechanism and set. Lines of older code go once there are newer ones in their place."""
 
     def run(self) -> None:
         """Run what the rows lack."""
@@ -56,7 +56,7 @@ class WeightsRun:
         plans = sorted(self.plans.glob(pattern))[::EVERY][: self.first]
         if not plans:
             raise UsageError(f"expected a folder of plans, found no file {pattern} in {self.plans}: check it")
-        drop_others(self.out)
+        drop_replaced(self.out)
         with copied(cache() / "weights") as folder:
             for each in (BASELINE, *(each for each in MECHANISMS if each.name in self.mechanism)):
                 known = scores_of(rows.read(self.out), each, self.set)
@@ -67,12 +67,13 @@ class WeightsRun:
                     rows.append(self.out, [key | {"scores": list(SCORES), "plans": found}])
 
 
-def drop_others(path: Path) -> None:
-    """Drop rows of other code from a file, and say how many."""
-    ours, count = rows.read(path), len(rows.read(path, any_code=True))
-    if len(ours) < count:
-        print(f"dropped {count - len(ours)} rows of other code from {path}", file=sys.stderr)
-        path.write_text("".join(json.dumps(row) + "\n" for row in ours))
+def drop_replaced(path: Path) -> None:
+    """Drop rows of older code in whose place there are newer ones, and of mechanisms that are gone; say how many."""
+    stored = rows.read(path, any_code=True)
+    kept = [row for row in stored if row["code"] == rows.fingerprint() or row in newest(stored)]
+    if len(kept) < len(stored):
+        print(f"dropped {len(stored) - len(kept)} rows of older code from {path}", file=sys.stderr)
+        path.write_text("".join(json.dumps(row) + "\n" for row in kept))
 
 
 @contextmanager

@@ -58,11 +58,21 @@ class WeightsTable:
     page: Path = Path("docs/contributing/mechanisms.md")
 
     def run(self) -> None:
-        """Write the page, and say where its rows are of another version of the code."""
-        stored = rows.newest(self.rows)
-        if any(row["code"] != rows.fingerprint() for row in stored):
-            print(f"the rows in {self.rows} are of another version of the code: run studies.weights.run")
+        """Write the page, and say how many of its rows are of an older version of the code."""
+        stored = rows.read(self.rows, any_code=True)
+        older = sum(row["code"] != rows.fingerprint() for row in newest(stored))
+        if older:
+            print(f"{older} of the rows in {self.rows} are of an older version of the code: run studies.weights.run")
         self.page.write_text(filled(self.page.read_text(), lambda _: table(stored)))
+
+
+def newest(stored: Sequence[Row]) -> list[Row]:
+    """Return the newest row of each mechanism and set, with those of everything on by the same versions of the code."""
+    digests = {each.name: each.digest for each in MECHANISMS}
+    ours = [row for row in stored if digests.get(row["mechanism"]) == row["edits"]]
+    last = list({(row["mechanism"], row["set"]): row for row in ours}.values())
+    versions = {(row["code"], row["set"]) for row in last}
+    return [row for row in stored if row in last or (not row["mechanism"] and (row["code"], row["set"]) in versions)]
 
 
 def table(stored: Sequence[Row], mechanisms: Sequence[Mechanism] = MECHANISMS) -> str:
@@ -76,8 +86,10 @@ def table(stored: Sequence[Row], mechanisms: Sequence[Mechanism] = MECHANISMS) -
 
 
 def verdict(stored: Sequence[Row], mechanism: Mechanism, plan_set: str) -> str:
-    """Return what is surely worse and better without a mechanism, in how many pairs of runs."""
-    base, off = (scores_of(stored, each, plan_set) for each in (BASELINE, mechanism))
+    """Return what is surely worse and better without a mechanism, in how many pairs of runs by the newest code."""
+    codes = [row["code"] for row in stored if rows.key_of(row, ("mechanism", "set")) == (mechanism.name, plan_set)]
+    same = [row for row in stored if row["code"] == codes[-1]] if codes else []
+    base, off = (scores_of(same, each, plan_set) for each in (BASELINE, mechanism))
     plans = sorted(base.keys() & off.keys())
     if len(plans) < LEAST_PAIRS:
         return "not run yet"
@@ -88,7 +100,8 @@ def verdict(stored: Sequence[Row], mechanism: Mechanism, plan_set: str) -> str:
         if told is not None:
             found[told[0] * measure.better > 0.0].append(f"{measure.words} {told[1]}")
     words = [f"{how}: {', '.join(told)}" for how, told in (("worse", found[False]), ("better", found[True])) if told]
-    return f"{len(plans)} pairs: {'; '.join(words) or 'nothing'}"
+    version = "" if codes[-1] == rows.fingerprint() else ", older code"
+    return f"{len(plans)} pairs{version}: {'; '.join(words) or 'nothing'}"
 
 
 def scores_of(stored: Sequence[Row], mechanism: Mechanism, plan_set: str) -> dict[str, dict[str, float | None]]:
