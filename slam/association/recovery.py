@@ -19,7 +19,7 @@ from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..geometry.poses import compose, inverse
 from ..geometry.quantities import Deviation, Number, Share, Spread
-from ..map.ray_evidence import ray_evidence
+from ..map.kernels.ray_evidence import ray_evidence
 from ..map.stochastic_map import StochasticMap
 from ..odometry.diagnosis import DiagnosisConfig
 from ..robot import Odometry, Scan

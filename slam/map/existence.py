@@ -18,7 +18,7 @@ from ..geometry.quantities import Distance, Probability
 from ..robot import RobotSpec, Scan, of_robot
 from .kernels.existence_kernels import Odds, look
 from .kernels.few_beams_kernels import Same, distances, lines_of, paired
-from .ray_evidence import ray_evidence
+from .kernels.ray_evidence import ray_evidence
 
 JUST_BEGUN = np.full(2, np.nan)
 """The place of the last look at a wall that begins in this scan."""

@@ -15,7 +15,7 @@ from .existence import JUST_BEGUN, ExistenceConfig
 from .kernels import wall_kernels
 from .kernels.existence_kernels import look
 from .kernels.extent_kernels import cut_back, take_in
-from .ray_evidence import RayEvidence, ray_evidence
+from .kernels.ray_evidence import RayEvidence, ray_evidence
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
 from .stochastic_map import StochasticMap

@@ -30,7 +30,7 @@ from chainslam.slam.estimation.gates import gate_level
 from chainslam.slam.extraction.config import ExtractionConfig
 from chainslam.slam.map.existence import JUST_BEGUN, ExistenceConfig
 from chainslam.slam.map.kernels.few_beams_kernels import Same, distances, lines_of
-from chainslam.slam.map.ray_evidence import ray_evidence
+from chainslam.slam.map.kernels.ray_evidence import ray_evidence
 
 from ..runner.command import run_study
 from .extraction import PLANS

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ...estimation.mounting import scanner_poses
-from ...map.ray_evidence import ray_evidence
+from ...map.kernels.ray_evidence import ray_evidence
 from ...robot import Scan, ScannerSpec
 from .solve import Unknowns
 

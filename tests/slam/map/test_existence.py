@@ -12,7 +12,7 @@ from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.geometry.lines import normals, through
 from chainslam.slam.map.existence import JUST_BEGUN, NOWHERE, ExistenceConfig, log_odds
 from chainslam.slam.map.kernels.existence_kernels import Odds, look
-from chainslam.slam.map.ray_evidence import ray_evidence
+from chainslam.slam.map.kernels.ray_evidence import ray_evidence
 from chainslam.slam.robot import Scan
 
 CONFIG = ExistenceConfig()

@@ -10,7 +10,7 @@ from chainslam.slam.extraction.extract import extract
 from chainslam.slam.extraction.segments import EndKind
 from chainslam.slam.extraction.visible_extent import sure_pieces
 from chainslam.slam.geometry.lines import normals, through
-from chainslam.slam.map.ray_evidence import ray_evidence
+from chainslam.slam.map.kernels.ray_evidence import ray_evidence
 from chainslam.slam.robot import Scan
 
 

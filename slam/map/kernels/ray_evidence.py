@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ..robot import Scan
-from .kernels.ray_kernels import crossings
+from ...robot import Scan
+from .ray_kernels import crossings
 
 
 @dataclass(frozen=True)
