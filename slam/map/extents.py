@@ -97,11 +97,17 @@ class Extents:
         return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked, whole, off_line_cov)
 
     def meet(self, pairs: Int[np.ndarray, "k 2"], along: Float[np.ndarray, "k 2"]) -> None:
-        """End the walls of each pair of ids, the one before the other, so far along each, m, where they reach past."""
+        """End the walls of each pair of ids, the one before the other, so far along each, m, where they reach past.
+
+        A wall of which that would leave less than ends are accurate stays as it is.
+        """
         before, after = self._records.rows(pairs[:, 0]), self._records.rows(pairs[:, 1])
         extents = self._records.columns["extents"]
-        np.minimum.at(extents[:, 1], before, along[:, 0])
-        np.maximum.at(extents[:, 0], after, along[:, 1])
+        ended = extents.copy()
+        np.minimum.at(ended[:, 1], before, along[:, 0])
+        np.maximum.at(ended[:, 0], after, along[:, 1])
+        is_left = ended[:, 1] - ended[:, 0] >= self._config.shared.resolution_m
+        extents[is_left] = ended[is_left]
 
     def see(
         self,

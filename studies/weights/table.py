@@ -67,12 +67,20 @@ class WeightsTable:
 
 
 def newest(stored: Sequence[Row]) -> list[Row]:
-    """Return the newest row of each mechanism and set, with those of everything on by the same versions of the code."""
+    """Return the newest row of each mechanism and set that no later one covers, with the runs of everything on.
+
+    A later row covers one if it has the same plans, or more; rows by other edits than today's are none.
+    """
     digests = {each.name: each.digest for each in MECHANISMS}
     ours = [row for row in stored if digests.get(row["mechanism"]) == row["edits"]]
-    last = list({(row["mechanism"], row["set"]): row for row in ours}.values())
+    last = [row for k, row in enumerate(ours) if not any(_covers(later, row) for later in ours[k + 1 :])]
     versions = {(row["code"], row["set"]) for row in last}
     return [row for row in stored if row in last or (not row["mechanism"] and (row["code"], row["set"]) in versions)]
+
+
+def _covers(later: Row, row: Row) -> bool:
+    names = ("mechanism", "set")
+    return rows.key_of(later, names) == rows.key_of(row, names) and later["plans"].keys() >= row["plans"].keys()
 
 
 def table(stored: Sequence[Row], mechanisms: Sequence[Mechanism] = MECHANISMS) -> str:
@@ -86,10 +94,14 @@ def table(stored: Sequence[Row], mechanisms: Sequence[Mechanism] = MECHANISMS) -
 
 
 def verdict(stored: Sequence[Row], mechanism: Mechanism, plan_set: str) -> str:
-    """Return what is surely worse and better without a mechanism, in how many pairs of runs by the newest code."""
-    codes = [row["code"] for row in stored if rows.key_of(row, ("mechanism", "set")) == (mechanism.name, plan_set)]
-    same = [row for row in stored if row["code"] == codes[-1]] if codes else []
-    base, off = (scores_of(same, each, plan_set) for each in (BASELINE, mechanism))
+    """Return what is surely worse and better without a mechanism, in how many pairs of runs of one code."""
+    # The newest code that has as many pairs as any.
+    code, base, off = "", dict[str, dict[str, float | None]](), dict[str, dict[str, float | None]]()
+    for each in dict.fromkeys(row["code"] for row in stored):
+        same = [row for row in stored if row["code"] == each]
+        known, without = (scores_of(same, one, plan_set) for one in (BASELINE, mechanism))
+        if len(known.keys() & without.keys()) >= len(base.keys() & off.keys()):
+            code, base, off = each, known, without
     plans = sorted(base.keys() & off.keys())
     if len(plans) < LEAST_PAIRS:
         return "not run yet"
@@ -100,7 +112,7 @@ def verdict(stored: Sequence[Row], mechanism: Mechanism, plan_set: str) -> str:
         if told is not None:
             found[told[0] * measure.better > 0.0].append(f"{measure.words} {told[1]}")
     words = [f"{how}: {', '.join(told)}" for how, told in (("worse", found[False]), ("better", found[True])) if told]
-    version = "" if codes[-1] == rows.fingerprint() else ", older code"
+    version = "" if code == rows.fingerprint() else ", older code"
     return f"{len(plans)} pairs{version}: {'; '.join(words) or 'nothing'}"
 
 

@@ -68,10 +68,13 @@ def test_plans_that_have_rows_of_this_code_are_not_run_again_and_rows_of_what_is
     for k in range(9):
         (tmp_path / f"lifull_{k}.json").touch()
     out = tmp_path / "rows.jsonl"
-    append(out, [{"mechanism": "long faces", "edits": OFF.digest, "set": "apartments", "code": "of yore"}])
+    old = {"set": "apartments", "code": "of yore", "scores": list(SCORES), "plans": {"lifull_0": [1.0] * len(SCORES)}}
+    monkeypatch.setattr("studies.weights.table.MECHANISMS", (OFF, SAME))
+    gone = [old | {"mechanism": "long faces", "edits": OFF.digest}, old | {"mechanism": OFF.name, "edits": "other"}]
+    append(out, [old | {"mechanism": each.name, "edits": each.digest} for each in (BASELINE, OFF, SAME)] + gone)
     study = WeightsRun(tmp_path, ("short faces",), first=2, out=out)
     study.run()
-    assert "dropped 1 rows of older code" in capsys.readouterr().err
+    assert "dropped 2 rows of older code" in capsys.readouterr().err
     study.run()
     assert asked == [("", 2), ("short faces", 2)]
     WeightsRun(tmp_path, ("short faces",), out=out).run()
@@ -80,6 +83,8 @@ def test_plans_that_have_rows_of_this_code_are_not_run_again_and_rows_of_what_is
         WeightsRun(tmp_path, ("long faces",), out=out).run()
     drop_replaced(out)
     assert len(read(out)) == 4
+    older = [row["mechanism"] for row in read(out, any_code=True) if row["code"] == "of yore"]
+    assert older == [BASELINE.name, SAME.name]
 
 
 def rows(mechanism, **changes):
@@ -151,6 +156,9 @@ def test_rows_of_older_code_stay_beside_its_own_runs_with_everything_on_until_th
     assert verdict(old + now, OFF, "apartments") == "40 pairs: nothing"
     assert verdict(old + now, SAME, "apartments") == "40 pairs, older code: nothing"
     assert verdict(old[1:], OFF, "apartments") == "not run yet"
+    few = [row | {"plans": dict(list(row["plans"].items())[:6])} for row in now]
+    assert newest(old + few) == [*old, *few]
+    assert verdict(old + few, OFF, "apartments") == "40 pairs, older code: worse: coverage -0.5 ± 0"
 
 
 def test_the_page_shows_what_was_stored():

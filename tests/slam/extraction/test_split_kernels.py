@@ -73,26 +73,28 @@ def test_a_surface_breaks_off_where_no_wall_has_two_such_ranges(seed, full):
     np.testing.assert_allclose(np.arctan2(returns.sin, returns.cos), np.angle(np.exp(1j * bearings[returns.beam])))
 
 
-@given(seed=seeds, count=st.integers(0, 24), runs=st.integers(1, 3))
-@settings(max_examples=100, deadline=None)
-def test_no_division_is_cheaper(seed, count, runs):
+@given(seed=seeds, count=st.integers(0, 24), runs=st.integers(1, 3), given_rules=st.booleans())
+@settings(max_examples=200, deadline=None)
+def test_no_division_is_cheaper(seed, count, runs, given_rules):
+    """Nor with rules by which one long piece may cost less than loose beams until a second one is long enough."""
     beams, rng = Beams(seed), np.random.default_rng(seed)
+    cost, fewest, sigmas = rng.uniform(0.0, 20.0), int(rng.integers(3, 9)), rng.uniform(0.5, 6.0)
+    rules = RULES if given_rules else RULES._replace(segment_cost=cost, least_beams=fewest, outlier_sigmas=sigmas)
     breaks = np.unique([0, *rng.integers(0, count + 1, runs - 1), count])
-    pieces = split(beams.sums[: count + 1], breaks, RULES).tolist()
-    loose = CONFIG.shared.outlier_sigmas**2
+    pieces = split(beams.sums[: count + 1], breaks, rules).tolist()
     least = [0.0]
     for stop in range(1, count + 1):
         run = max(at for at in breaks if at < stop)
         ways = (
-            least[start] + beams.chi2(start, stop) + CONFIG.segment_cost
-            for start in range(run, stop - CONFIG.least_beams + 1)
+            least[start] + beams.chi2(start, stop) + rules.segment_cost
+            for start in range(run, stop - rules.least_beams + 1)
         )
-        least.append(min(least[-1] + loose, *ways, np.inf))
+        least.append(min(least[-1] + rules.outlier_sigmas**2, *ways, np.inf))
     assert all(one[1] <= other[0] for one, other in itertools.pairwise(pieces))
-    assert all(stop - start >= CONFIG.least_beams for start, stop in pieces)
+    assert all(stop - start >= rules.least_beams for start, stop in pieces)
     assert not any(start < at < stop for start, stop in pieces for at in breaks)
-    in_pieces = sum(stop - start for start, stop in pieces)
-    price = sum(beams.chi2(*piece) + CONFIG.segment_cost for piece in pieces) + loose * (count - in_pieces)
+    loose = count - sum(stop - start for start, stop in pieces)
+    price = sum(beams.chi2(*piece) + rules.segment_cost for piece in pieces) + rules.outlier_sigmas**2 * loose
     assert price == pytest.approx(least[count], rel=1e-4, abs=1e-3)
 
 

@@ -8,10 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainslam.slam.association.matching import MatchingConfig
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.config import MapperConfig
 from chainslam.slam.estimation.backend import Joint
 from chainslam.slam.estimation.shared import SharedConfig
+from chainslam.slam.extraction.config import ExtractionConfig
 from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.bends import ends_at_bends
+from chainslam.slam.map.extents import WallsConfig
+from chainslam.slam.map.landmarks import Landmarks
+from chainslam.slam.map.merging import MergingConfig
+from chainslam.slam.map_keeper import MapKeeper
 from tests.slam.map.maps import map_of
 
 ONE_WALL, RANGE_M = MatchingConfig().one_wall, 4.0
@@ -80,6 +87,42 @@ def test_walls_that_are_far_or_seldom_seen_or_tentative_stay_as_they_are(which):
     seldom = np.where(np.arange(2) == which, 9, 20)
     assert met(replace(walls, observations=seldom))[0] == []
     assert met(replace(walls, tentative=np.arange(2) == which))[0] == []
+
+
+def ended(walls, pairs, along):
+    """Return from where to where walls reach once each pair has met."""
+    landmarks = Landmarks(WallsConfig(), ExtractionConfig().sure_beams)
+    landmarks.records.rows(walls.ids)
+    landmarks.records.columns["extents"][:] = walls.extents
+    landmarks.extents.meet(np.array(pairs), np.array(along))
+    return landmarks.records.columns["extents"]
+
+
+def test_a_wall_ends_at_the_nearest_of_its_bends_and_is_never_lengthened():
+    walls = map_of(np.array([[[-1.0, 0.0], [1.0, 0.0]]] * 4), np.zeros(3))
+    extents = ended(walls, [[0, 1], [0, 2], [3, 0], [2, 3]], [[0.5, -0.2], [0.3, -2.0], [0.7, -0.4], [3.0, 0.2]])
+    np.testing.assert_allclose(extents, [[-0.4, 0.3], [-0.2, 1.0], [-1.0, 1.0], [0.2, 0.7]])
+
+
+@pytest.mark.parametrize(("left_m", "is_left"), [(-0.03, False), (0.04, False), (0.06, True)])
+def test_a_wall_of_which_nothing_would_be_left_stays_as_it_is(left_m, is_left):
+    """Two bends at its ends, or one that lies before it begins: its other side ends there all the same."""
+    walls = map_of(np.array([[[-1.0, 0.0], [1.0, 0.0]]] * 3), np.zeros(3))
+    extents = ended(walls, [[0, 1], [2, 0]], [[0.1, -0.6], [0.5, 0.1 - left_m]])
+    np.testing.assert_allclose(extents, [[0.1 - left_m, 0.1] if is_left else [-1.0, 1.0], [-0.6, 1.0], [-1.0, 0.5]])
+
+
+def test_walls_that_never_merge_never_end_at_bends(monkeypatch):
+    """As in the paper, which knows neither."""
+    walls = known(bent(6.0))
+    for merging, ends_at_m in ((MergingConfig(), 0.0), (None, -0.3)):
+        keeper = MapKeeper(BACKENDS["full-ekf"].make(np.zeros(3), np.eye(3)), MapperConfig(merging=merging))
+        keeper.landmarks.records.rows(walls.ids)
+        extents = keeper.landmarks.records.columns["extents"]
+        extents[:] = walls.extents
+        monkeypatch.setattr(keeper, "map", lambda extents=extents: replace(walls, extents=extents.copy()))
+        found = keeper._ended_at_bends(RANGE_M)
+        np.testing.assert_allclose(found.extents[1, 0] - walls.extents[1, 0], 0.3 + ends_at_m, atol=1e-9)
 
 
 def crossing_of(first, second, shared):

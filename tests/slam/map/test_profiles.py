@@ -146,6 +146,9 @@ def test_a_break_that_no_scan_shows_is_stated_as_far_off_as_it_puts_the_faces(fa
         off = true - np.polynomial.Polynomial.fit(at, true, 1)(at)
         (found,) = profiles.misfits(np.array([WALL]), np.array([[-1.0, 1.0]]))
         assert 0.5 < np.sqrt(found / (4.0 * np.mean(off**2))) < 1.5
+        broken = records.columns["broken"][:, :3].copy()
+        longer = np.array([[0.05 * first - 1.0, 0.05 * (first + sums.shape[1] - 1) + 0.5]])
+        assert profiles.misfits(np.array([WALL]), longer) == pytest.approx(misfits(broken, longer)) != found
 
 
 def test_a_wall_is_crooked_only_where_its_break_lies_between_its_ends():
