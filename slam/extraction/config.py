@@ -12,7 +12,7 @@ from ..geometry.quantities import Beams, Number, Part, Sigmas, Turn, Weight
 class ExtractionConfig:
     """How a scan is split into line segments.
 
-    Costs, gains and sigmas were chosen on half of the plans, by recall, segments across two faces and NEES. The 95th
+    Costs and sigmas were chosen on half of the plans, by recall, segments across two faces and NEES. The 95th
     percentile of a segment's NEES is four times what it should be with 3 beams, 1.4 times with 4. The last beam at an
     end may be of another surface: off by five to seven standard deviations, it is not noticed among three or four.
     """

@@ -26,8 +26,7 @@ class StochasticMap:
     tentative: Bool[np.ndarray, " n"]
     """Walls that were not seen well enough yet to be followed or chained."""
     crooked: Bool[np.ndarray, " n"]
-    """Walls whose beams, over many scans, do not lie on a line (`profiles`): they are stated to be off it by as
-    much."""
+    """Walls that stand for two faces: all scans together show a break between their ends (`profiles`)."""
     whole: Bool[np.ndarray, " n"] | None = None
     """Walls of which scan after scan showed both ends, hidden by nothing: they reach no farther. None where unknown."""
     off_line_cov: Float[np.ndarray, "n 2 2"] | None = None

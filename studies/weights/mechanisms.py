@@ -128,7 +128,7 @@ MAP = (
 EXTRACTION = (
     _off("sure gap", "a segment ends where its beams stand so far apart that a door could hide between them",
          ("slam.extraction.kernels.extent_kernels", "is_cut = clipped != along[end]", "is_cut = False")),
-    _off("joints", "the boundary of two segments moves to where both lines fit best and then cross",
+    _off("joints", "the boundary of two segments moves to where their lines cross",
          ("slam.extraction.kernels.joint_kernels", "if cut < pieces[k, 1] or cut > begins:", "if cut < -1:")),
     _off("beams in doubt", "a beam at a corner that either line explains counts for neither",
          ("slam.extraction.kernels.joint_kernels",
