@@ -113,24 +113,26 @@ def test_what_a_run_is_expected_to_take_holds_for_stored_runs(world, steps):
 
 
 @pytest.mark.parametrize(
-    "corners",
+    ("corners", "seeds"),
     [
-        [(0, 0), (12, 0), (12, 1.2), (0, 1.2)],
-        [(0, 0), (25, 0), (25, 3), (0, 3)],
-        [(0, 0), (10, 0), (10, 10), (8.5, 10), (8.5, 1.5), (0, 1.5)],
-        [(0, 0), (10, 0), (10, 10), (0, 10)],
-        pytest.param([(0, 0), (60, 0), (60, 1.5), (0, 1.5)], marks=pytest.mark.long),
-        pytest.param([(0, 0), (20, 0), (20, 20), (0, 20)], marks=pytest.mark.long),
+        ([(0, 0), (12, 0), (12, 1.2), (0, 1.2)], 1),
+        ([(0, 0), (25, 0), (25, 3), (0, 3)], 1),
+        ([(0, 0), (10, 0), (10, 10), (8.5, 10), (8.5, 1.5), (0, 1.5)], 1),
+        ([(0, 0), (10, 0), (10, 10), (0, 10)], 1),
+        pytest.param([(0, 0), (60, 0), (60, 1.5), (0, 1.5)], 1, marks=pytest.mark.long),
+        pytest.param([(0, 0), (20, 0), (20, 20), (0, 20)], 5, marks=pytest.mark.long),
     ],
 )
-def test_what_corridors_and_halls_take_is_expected_within_a_factor_of_three(corners, tmp_path):
+def test_what_corridors_and_halls_take_is_expected_within_a_factor_of_three(corners, seeds, tmp_path):
+    """In the median: in a hall of which it sees no wall for 12 m a robot in three searches four times as long."""
     solid = shapely.Polygon(corners)
     solid = solid.buffer(0.3, join_style="mitre").difference(solid)
     wall = {"type": "Feature", "properties": {"kind": "wall"}, "geometry": shapely.geometry.mapping(solid)}
     path = tmp_path / "corridor.geojson"
     path.write_text(json.dumps({"type": "FeatureCollection", "features": [wall]}))
     low, high = expected_steps(load_world(str(path)), 100_000)
-    steps = run_trial(TrialConfig(str(path), "invariant-ekf")).summary["steps"]
+    runs = (run_trial(TrialConfig(str(path), "invariant-ekf", seed=seed)) for seed in range(1, seeds + 1))
+    steps = np.median([run.summary["steps"] for run in runs])
     assert low <= steps <= high
     assert steps / 3.0 < np.sqrt(low * high) < 3.0 * steps
 

@@ -41,5 +41,5 @@ def test_a_real_building_is_explored_to_its_end(name, contours):
         fused=[each for each in votes.fused if each[0] not in crooked],
         fused_of_few_beams=[each for each in votes.fused_of_few_beams if each[0] not in crooked],
     )
-    assert len(crooked) <= 2
     assert plane.false_matches() <= len(votes.fused) / 400
+    assert votes.false_matches() <= len(votes.fused) / 100
