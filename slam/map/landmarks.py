@@ -41,13 +41,14 @@ class Landmarks:
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""
         ids, extents = self.records.ids, self.records.columns["extents"]
-        cov = self.reliability.off_line_cov(ids, extents, self.profiles.misfits(ids, extents))
+        cov = self.reliability.off_line_cov(ids, extents, *self.profiles.misfits(ids, extents))
         return self.extents.map(belief, self.profiles.crooked(ids, extents), cov)
 
     def lack_of_fit(self, segments: Segments, owners: Int[np.ndarray, " s"]) -> Float[np.ndarray, "s 2 2"]:
         """Return how far the face that each segment shows may be from the line of its wall, of (alpha rad, r m)."""
         extents = self.records.columns["extents"][self.records.rows(owners)]
-        return cov_of_breaks(segments, self.profiles.misfits(owners, extents), extents[:, 1] - extents[:, 0])
+        misfits_m2, drawn = self.profiles.misfits(owners, extents)
+        return cov_of_breaks(segments, misfits_m2, drawn[:, 1] - drawn[:, 0])
 
     def observe(
         self,

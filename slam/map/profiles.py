@@ -66,22 +66,25 @@ class Profiles:
         if before or after:
             begin, sums = begin - before, np.pad(sums, ((0, 0), (before, after)))
         sums[:, first - begin : first - begin + more.shape[1]] += more
-        at, step_m, turn_rad, ratio = surest(sums)
+        at, step_m, turn_rad, ratio = surest(sums, self._least_ratio)
         columns["profile"][row] = begin, sums
         columns["broken"][row] = 0.0
         if ratio > self._least_ratio:
             places = self._pitch_m * np.array([begin + at, begin, begin + sums.shape[1] - 1])
             columns["broken"][row] = places[0], step_m, turn_rad, places[1], places[2]
 
-    def misfits(self, ids: Int[np.ndarray, " n"], extents: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
-        """Return how far the faces of walls are off their lines, as variances across these, m^2.
+    def misfits(
+        self, ids: Int[np.ndarray, " n"], extents: Float[np.ndarray, "n 2"]
+    ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 2"]]:
+        """Return how far the faces of walls are off their lines, as variances across these, m^2, and over what.
 
         `extents` are from and to along each, m from its anchor. What beams have shown beyond them drew the line, too: a
         wall that ends at its bend now was seen past it before.
         """
         broken = self._records.columns["broken"][self._records.rows(ids)]
         low, high = np.minimum(extents[:, 0], broken[:, 3]), np.maximum(extents[:, 1], broken[:, 4])
-        return misfits(broken[:, :3].copy(), np.stack([low, high], axis=-1))
+        drawn = np.stack([low, high], axis=-1)
+        return misfits(broken[:, :3].copy(), drawn), drawn
 
     def crooked(self, ids: Int[np.ndarray, " n"], extents: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
         """Return which walls have a break between their ends: they stand for two faces."""

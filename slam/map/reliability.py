@@ -77,13 +77,18 @@ class Reliability:
             keep_longest(longest[merger.keep], length)
 
     def off_line_cov(
-        self, ids: Int[np.ndarray, " n"], extents: Float[np.ndarray, "n 2"], misfits_m2: Float[np.ndarray, " n"]
+        self,
+        ids: Int[np.ndarray, " n"],
+        extents: Float[np.ndarray, "n 2"],
+        misfits_m2: Float[np.ndarray, " n"],
+        drawn: Float[np.ndarray, "n 2"],
     ) -> Float[np.ndarray, "n 2 2"]:
         """Return how far walls of such extents, m along their lines, may be from them, of (alpha rad, d m).
 
+        Their misfits are those of lines over what was `drawn`, from and to, m.
         What one scan alone shows of a wall, longer than any other, may be of two faces: a short one and another behind
         it. So a wall counts as long as two scans saw it.
         """
         longest = self._records.columns["longest"][self._records.rows(ids)]
         edges = float(self._config.edge_m), float(self._config.shared.face_m)
-        return reliability_kernels.off_line_cov(extents, longest, misfits_m2, *edges)
+        return reliability_kernels.off_line_cov(extents, longest, misfits_m2, drawn, *edges)

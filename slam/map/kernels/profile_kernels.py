@@ -126,10 +126,12 @@ def breaks_of_beams(
 
 
 @compiled
-def surest(sums: Float[np.ndarray, "5 p"]) -> tuple[int, float, float, float]:
+def surest(sums: Float[np.ndarray, "5 p"], least_ratio: float) -> tuple[int, float, float, float]:
     """Return where the likeliest break lies, its step m and turn rad, and its likelihood ratio.
 
-    That is by how much the squared residuals of all beams, in their variances, are less with the break.
+    That is by how much the squared residuals of all beams, in their variances, are less with the break. It has a step
+    and a turn only if one alone leaves more than `least_ratio` of that: a turn that nothing tells would put far ends
+    of the wall far off its line.
     """
     best, best_step, best_turn, best_ratio = 0, 0.0, 0.0, 0.0
     for p in range(sums.shape[1]):
@@ -140,6 +142,12 @@ def surest(sums: Float[np.ndarray, "5 p"]) -> tuple[int, float, float, float]:
             ratio = step * sums[3, p] + turn * sums[4, p]
             if ratio > best_ratio:
                 best, best_step, best_turn, best_ratio = p, step, turn, ratio
+    if best_ratio > 0.0:
+        of_step, of_turn = sums[3, best] ** 2 / sums[0, best], sums[4, best] ** 2 / sums[2, best]
+        if best_ratio - max(of_step, of_turn) <= least_ratio:
+            is_step = of_step >= of_turn
+            best_step = sums[3, best] / sums[0, best] if is_step else 0.0
+            best_turn = 0.0 if is_step else sums[4, best] / sums[2, best]
     return best, best_step, best_turn, best_ratio
 
 

@@ -32,21 +32,23 @@ def off_line_cov(
     extents: Float[np.ndarray, "n 2"],
     longest: Float[np.ndarray, "n 2"],
     across: Float[np.ndarray, " n"],
+    drawn: Float[np.ndarray, "n 2"],
     edge_m: float,
     face_m: float,
 ) -> Float[np.ndarray, "n 2 2"]:
     """Return how far each wall may be from its line, as a covariance of (alpha rad, d m) about its anchor.
 
-    A wall counts as long as two scans have seen it; one of which a single scan showed enough, as long as that did.
+    A wall counts as long as two scans have seen it; one of which a single scan showed enough, as long as that did. Its
+    misfit `across` is of a line over what was `drawn`.
     """
     n = len(extents)
-    variances, lengths, middles = np.empty(n), np.empty(n), np.empty(n)
+    variances, lengths, middles = np.empty(n), np.empty(n), 0.5 * (extents[:, 0] + extents[:, 1])
     for k in range(n):
         seen_m = longest[k, 0] if longest[k, 0] > 0.0 else longest[k, 1]
         lengths[k] = min(extents[k, 1] - extents[k, 0], seen_m)
-        middles[k] = 0.5 * (extents[k, 0] + extents[k, 1])
-        variances[k] = across[k] + edge_variance(lengths[k], edge_m, face_m)
-    return edge_cov(variances, lengths, middles)
+        variances[k] = edge_variance(lengths[k], edge_m, face_m)
+    of_misfit = edge_cov(across, drawn[:, 1] - drawn[:, 0], 0.5 * (drawn[:, 0] + drawn[:, 1]))
+    return edge_cov(variances, lengths, middles) + of_misfit
 
 
 @compiled

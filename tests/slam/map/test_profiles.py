@@ -70,7 +70,7 @@ def test_the_break_at_a_place_is_that_of_a_dense_least_squares(seed):
         found, information, ratio = dense([walls[place_of[k]]], place)
         ss, st, tt = sums[:3, k]
         np.testing.assert_allclose([[ss, st], [st, tt]], information, rtol=1e-6)
-        at, step, turn, likelihood = surest(np.ascontiguousarray(sums[:, k : k + 1]))
+        at, step, turn, likelihood = surest(np.ascontiguousarray(sums[:, k : k + 1]), 0.0)
         np.testing.assert_allclose([at, step, turn, likelihood], [0, *found, ratio], rtol=1e-6)
 
 
@@ -85,8 +85,30 @@ def test_the_sums_of_scans_are_those_of_one_least_squares_of_all(seed):
     again = sum(breaks_of_beams(*each, one, place, one[:1]) for each in moved)
     np.testing.assert_allclose(again, sums, rtol=1e-6, atol=1e-6)
     found, information, ratio = dense(moved, 0.2)
-    np.testing.assert_allclose(surest(sums)[1:], [*found, ratio], rtol=1e-6)
+    np.testing.assert_allclose(surest(sums, 0.0)[1:], [*found, ratio], rtol=1e-6)
     np.testing.assert_allclose([[sums[0, 0], sums[1, 0]], [sums[1, 0], sums[2, 0]]], information, rtol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("true", [(0.02, 0.0), (0.0, 0.05), (0.03, -0.1)])
+def test_a_break_has_a_step_and_a_turn_only_where_one_alone_explains_much_less(seed, true):
+    """By dense least squares of each alone."""
+    rng, place, least = np.random.default_rng(seed), 0.2, 20.0
+    along, across, sigma = drawn(rng, -1.0, 1.5, 60)
+    across = across + true[0] * (along > place) + true[1] * np.maximum(along - place, 0.0)
+    one = np.zeros(60, dtype=np.int64)
+    sums = breaks_of_beams(along, across, sigma, one, np.array([place]), one[:1])
+    columns = np.column_stack([np.ones(60), along, along > place, np.maximum(along - place, 0.0)]) / sigma[:, None]
+    left = {}
+    for name, among in (("none", [0, 1]), ("step", [0, 1, 2]), ("turn", [0, 1, 3]), ("both", [0, 1, 2, 3])):
+        found, chi2 = np.linalg.lstsq(columns[:, among], across / sigma, rcond=None)[:2]
+        left[name] = float(chi2[0]), found[2:]
+    at, step, turn, ratio = surest(sums, least)
+    alone = min("step", "turn", key=lambda name: left[name][0])
+    expected = {"step": [*left["step"][1], 0.0], "turn": [0.0, *left["turn"][1]]}[alone]
+    if left[alone][0] - left["both"][0] > least:
+        expected = left["both"][1]
+    np.testing.assert_allclose([at, step, turn, ratio], [0, *expected, left["none"][0] - left["both"][0]], rtol=1e-6)
 
 
 def test_fewer_than_two_beams_beside_a_place_say_nothing_of_it():
@@ -144,11 +166,13 @@ def test_a_break_that_no_scan_shows_is_stated_as_far_off_as_it_puts_the_faces(fa
         true = np.select([(at >= min(f[:, 0])) & (at <= max(f[:, 0])) for f in near],
                          [np.interp(at, np.sort(f[:, 0]), f[np.argsort(f[:, 0]), 1]) for f in near])  # fmt: skip
         off = true - np.polynomial.Polynomial.fit(at, true, 1)(at)
-        (found,) = profiles.misfits(np.array([WALL]), np.array([[-1.0, 1.0]]))
+        (found,), _ = profiles.misfits(np.array([WALL]), np.array([[-1.0, 1.0]]))
         assert 0.5 < np.sqrt(found / (4.0 * np.mean(off**2))) < 1.5
         broken = records.columns["broken"][:, :3].copy()
         longer = np.array([[0.05 * first - 1.0, 0.05 * (first + sums.shape[1] - 1) + 0.5]])
-        assert profiles.misfits(np.array([WALL]), longer) == pytest.approx(misfits(broken, longer)) != found
+        off_m2, over = profiles.misfits(np.array([WALL]), longer)
+        assert off_m2 == pytest.approx(misfits(broken, longer)) != found
+        np.testing.assert_array_equal(over, longer)
 
 
 def test_a_wall_is_crooked_only_where_its_break_lies_between_its_ends():
@@ -167,7 +191,7 @@ def test_a_straight_wall_is_never_broken(seed):
     profiles, poses = Profiles(), random_poses(rng, 700)
     for pose, scan in zip(poses, scans(bent(0.0), poses, rng), strict=True):
         look(profiles, pose, scan)
-        assert profiles.misfits(np.array([WALL]), WHOLE) == 0.0
+        assert profiles.misfits(np.array([WALL]), WHOLE)[0] == 0.0
 
 
 def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_break():
@@ -179,7 +203,7 @@ def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_break():
         ranges = scan.ranges_m.copy()
         ranges[segments.beams[0, 1]] += 0.03
         look(profiles, pose, Scan(scan.bearings_rad, ranges, SIGMA_M, 4.0, 0.0), segments.take(np.array([0])))
-    assert profiles.misfits(np.array([WALL]), WHOLE) == 0.0
+    assert profiles.misfits(np.array([WALL]), WHOLE)[0] == 0.0
 
 
 def test_two_segments_of_one_wall_tell_the_step_between_them():
@@ -193,7 +217,7 @@ def test_two_segments_of_one_wall_tell_the_step_between_them():
     look(alone, pose, scan, segments.take(on_wall[:1]))
     look(both, pose, scan, segments.take(on_wall))
     ids, ends = np.array([WALL]), np.array([[-1.4, 1.4]])
-    assert alone.misfits(ids, ends) == 0.0 < both.misfits(ids, ends)
+    assert alone.misfits(ids, ends)[0] == 0.0 < both.misfits(ids, ends)[0]
 
 
 def test_what_was_seen_of_a_merged_wall_counts_where_it_lies():

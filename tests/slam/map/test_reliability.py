@@ -130,7 +130,7 @@ def test_a_wall_counts_as_long_as_two_scans_saw_it():
     reliability, extents = Reliability(), np.array([[0.0, 0.6]])
 
     def turn_rad():
-        return float(np.sqrt(reliability.off_line_cov(OWNER, extents, np.zeros(1))[0, 0, 0]))
+        return float(np.sqrt(reliability.off_line_cov(OWNER, extents, np.zeros(1), extents)[0, 0, 0]))
 
     reliability.see(observation(0.0, 0.01, length_m=0.6), OWNER)
     alone = turn_rad()

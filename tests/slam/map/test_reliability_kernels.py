@@ -45,13 +45,19 @@ def test_a_wall_is_off_its_line_by_its_misfit_and_where_it_is_short(seed):
     across = rng.uniform(0.0, 1.0, 5) * (rng.random(5) < 0.7)
     extents = np.sort(rng.uniform(-2.0, 2.0, (5, 2)), axis=1)
     longest = np.sort(rng.uniform(0.01, 2.0, (5, 2)) * (rng.random((5, 2)) < [0.7, 1.0]), axis=1)
-    off = off_line_cov(extents, longest, across, 0.01, 0.2)
+    drawn = extents + rng.uniform(0.0, 1.0, (5, 2)) * [-1.0, 1.0]
+    off = off_line_cov(extents, longest, across, drawn, 0.01, 0.2)
     for row in range(5):
         length = min(np.ptp(extents[row]), min(seen for seen in longest[row] if seen > 0.0))
-        variance = across[row] + (0.01 / (1.0 + (length / 0.2) ** 4)) ** 2
-        turn = 12.0 * variance / max(length, 1e-3) ** 2
-        lever = np.array([1.0, extents[row].mean()])
-        np.testing.assert_allclose(off[row], turn * np.outer(lever, lever) + np.diag([0.0, variance]), rtol=1e-9)
+        short = (0.01 / (1.0 + (length / 0.2) ** 4)) ** 2
+        expected = np.zeros((2, 2))
+        for variance, over_m, middle in (
+            (short, length, extents[row].mean()),
+            (across[row], np.ptp(drawn[row]), drawn[row].mean()),
+        ):
+            lever = np.array([1.0, middle])
+            expected += 12.0 * variance / max(over_m, 1e-3) ** 2 * np.outer(lever, lever) + np.diag([0.0, variance])
+        np.testing.assert_allclose(off[row], expected, rtol=1e-9)
 
 
 @few
