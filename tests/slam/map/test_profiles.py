@@ -169,6 +169,7 @@ def test_a_break_that_no_scan_shows_is_stated_as_far_off_as_it_puts_the_faces(fa
         (found,), _ = profiles.misfits(np.array([WALL]), np.array([[-1.0, 1.0]]))
         assert 0.5 < np.sqrt(found / (4.0 * np.mean(off**2))) < 1.5
         broken = records.columns["broken"][:, :3].copy()
+        assert len(faces) == 2 or broken[0, 2] == 0.0  # of a step alone scans tell no turn
         longer = np.array([[0.05 * first - 1.0, 0.05 * (first + sums.shape[1] - 1) + 0.5]])
         off_m2, over = profiles.misfits(np.array([WALL]), longer)
         assert off_m2 == pytest.approx(misfits(broken, longer)) != found
