@@ -48,15 +48,10 @@ class UnevenStudy:
 
     def run(self) -> None:
         """Run what is to be run, and print the tables."""
-        files = sorted(self.plans.glob("lifull_*"))[::EVERY][: self.count]
-        if not files:
-            raise UsageError(f"expected a folder of plans, found no lifull_* in {self.plans}: check it")
-        self.out.parent.mkdir(parents=True, exist_ok=True)
-        drawn = [_drawn(uneven(load_world(str(file)), seed=1), self.out.parent) for file in files]
         trials = [
             TrialConfig(str(file), self.backend, seed=seed, max_steps=self.max_steps)
             for seed in range(1, self.seeds + 1)
-            for file in drawn
+            for file in drawn(self.plans, self.count, self.out.parent)
         ]
         rows = list(rows_of(trials, self.out, self.jobs))
         shown = headed("Uneven apartments", HEAD)
@@ -71,6 +66,18 @@ class UnevenStudy:
 
 def _short(value: str | float | None) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def drawn(plans: Path, count: int | None, folder: Path) -> list[Path]:
+    """Make every 13th apartment of a folder of plans uneven, up to so many, and return their files in another folder.
+
+    Raises UsageError where there is no apartment.
+    """
+    files = sorted(plans.glob("lifull_*"))[::EVERY][:count]
+    if not files:
+        raise UsageError(f"expected a folder of plans, found no lifull_* in {plans}: check it")
+    folder.mkdir(parents=True, exist_ok=True)
+    return [_drawn(uneven(load_world(str(file)), seed=1), folder) for file in files]
 
 
 def _drawn(world: World, folder: Path) -> Path:

@@ -18,14 +18,16 @@ from typing import Literal
 from chainslam.experiments.usage import UsageError
 from chainslam.slam.geometry.compiled import cache
 
+from ..plans.uneven import drawn
 from ..runner import rows
 from ..runner.command import run_study
 from .mechanisms import BASELINE, MECHANISMS, Mechanism
 from .table import ROWS, SCORES, newest, scores_of
 
-PlanSet = Literal["apartments", "schools"]
-NAMED: dict[PlanSet, tuple[str, int]] = {"apartments": ("lifull_*", 5_000), "schools": ("cml_*", 1_500)}
-"""Which files are plans of a set, and after how many scans a run ends: without some mechanisms none ends by itself."""
+PlanSet = Literal["apartments", "uneven", "schools"]
+MAX_STEPS: dict[PlanSet, int] = {"apartments": 5_000, "uneven": 5_000, "schools": 1_500}
+"""After how many scans a run ends: without some mechanisms none ends by itself."""
+NAMED = {"apartments": "lifull_*", "schools": "cml_*"}
 EVERY = 4
 """Every so manyth plan of a set by name: 40 of 160 apartments, 10 of 39 schools."""
 PACKAGES = ("chainslam", "slam", "explore", "sim", "viz", "experiments", "studies")
@@ -40,7 +42,7 @@ class WeightsRun:
     mechanism: tuple[str, ...] = tuple(each.name for each in MECHANISMS)
     """Which mechanisms are turned off, one at a time."""
     set: PlanSet = "apartments"
-    """40 apartments to their ends, or 1,500 scans of each of ten schools."""
+    """40 apartments to their ends, 13 uneven ones (`make uneven`), or 1,500 scans of each of ten schools."""
     first: int | None = None
     """Only so many plans of the set."""
     jobs: int = 2
@@ -52,19 +54,26 @@ class WeightsRun:
         """Run what the rows lack."""
         if unknown := set(self.mechanism) - {each.name for each in MECHANISMS}:
             raise UsageError(f"expected names of mechanisms, found {', '.join(unknown)}: see studies/weights")
-        pattern, max_steps = NAMED[self.set]
-        plans = sorted(self.plans.glob(pattern))[::EVERY][: self.first]
-        if not plans:
-            raise UsageError(f"expected a folder of plans, found no file {pattern} in {self.plans}: check it")
-        drop_replaced(self.out)
         with copied(cache() / "weights") as folder:
+            plans = self._files(folder)
+            drop_replaced(self.out)
             for each in (BASELINE, *(each for each in MECHANISMS if each.name in self.mechanism)):
                 known = scores_of(rows.read(self.out), each, self.set)
                 if any(plan.stem not in known for plan in plans):
                     print(f"{self.set}: {each.name or each.what}", flush=True)
-                    found = driven(folder, each, [str(plan.resolve()) for plan in plans], max_steps, self.jobs)
+                    worlds = [str(plan.resolve()) for plan in plans]
+                    found = driven(folder, each, worlds, MAX_STEPS[self.set], self.jobs)
                     key = {"mechanism": each.name, "edits": each.digest, "set": self.set}
                     rows.append(self.out, [key | {"scores": list(SCORES), "plans": found}])
+
+    def _files(self, folder: Path) -> list[Path]:
+        """Return the plans of the set; raises UsageError where there is none."""
+        if self.set == "uneven":
+            return drawn(self.plans, self.first, folder / "uneven")
+        plans = sorted(self.plans.glob(NAMED[self.set]))[::EVERY][: self.first]
+        if not plans:
+            raise UsageError(f"expected a folder of plans, found no file {NAMED[self.set]} in {self.plans}: check it")
+        return plans
 
 
 def drop_replaced(path: Path) -> None:

@@ -17,7 +17,7 @@ from ..runner.rows import Row
 from .mechanisms import BASELINE, MECHANISMS, Mechanism
 
 ROWS = Path(__file__).with_name("rows.jsonl")
-SETS = ("apartments", "schools")
+SETS = ("apartments", "uneven", "schools")
 SURE = 2.0
 """A mean difference of more than so many of its own standard errors is told."""
 LEAST_PAIRS = 5
@@ -85,7 +85,7 @@ def _covers(later: Row, row: Row) -> bool:
 
 def table(stored: Sequence[Row], mechanisms: Sequence[Mechanism] = MECHANISMS) -> str:
     """Return a row for each mechanism, in their order, with a column for each set of plans."""
-    heads = ("mechanism", "what it does", *(f"without it, {plan_set}" for plan_set in SETS))
+    heads = ("mechanism", "what it does", *(f"without it: {plan_set}" for plan_set in SETS))
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for each in mechanisms:
         cells = (each.name, each.what, *(verdict(stored, each, plan_set) for plan_set in SETS))
