@@ -269,7 +269,7 @@ weights: setup
 	for plans in apartments uneven schools; do nice $(BIN)/python -m studies.weights.run --plans $(PLANS) --set $$plans || exit; done
 	$(BIN)/python -m studies.weights.table
 
-.PHONY: pictures results screenshots player
+.PHONY: pictures alike results screenshots player
 
 # The films that the site's first page plays, from runs made now.
 player: setup
@@ -277,6 +277,10 @@ player: setup
 	    $(BIN)/chainslam explore $$world --seed 1 --out $$out/drive --force && \
 	    $(BIN)/chainslam replay $$out/drive/log.npz --backend $(PLAYED) --out $$out/runs --force && \
 	    $(BIN)/python -m chainslam.experiments.views.player $(PLAYED:%=$$out/runs/%) --out docs/films/$$name.json || exit; done
+
+# Does this code drive as version THAN of it, to the last bit? Then rows of that version count as rows of this one.
+alike: setup
+	$(BIN)/python -m studies.runner.alike --than $(THAN) --plans $(PLANS)
 
 # The tables of docs/benchmarks.md and docs/contributing from stored rows; says which rows are of another version of the code.
 results: setup

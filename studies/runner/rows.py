@@ -17,6 +17,8 @@ from chainslam.experiments.terminal.console import plain_console
 from chainslam.experiments.usage import UsageError
 
 HERE = Path(__file__).parents[2]
+ALIKE = Path(__file__).with_name("alike.jsonl")
+"""Versions of the code that drive as older ones do, bit for bit (`studies.runner.alike`)."""
 Row = dict[str, Any]
 Key = tuple[Any, ...]
 Task = TypeVar("Task", bound=Hashable)
@@ -68,7 +70,19 @@ def read(path: Path, names: Sequence[str] = (), any_code: bool = False) -> list[
         raise UsageError(
             f"expected rows with {', '.join(names)} in {path}, found {error!r}: name another --out"
         ) from error
+    newer = {} if path == ALIKE else newer_names()
+    rows = [row | {"code": newer.get(row["code"], row["code"])} for row in rows]
     return [row for row in rows if any_code or row["code"] == fingerprint()]
+
+
+@lru_cache
+def newer_names() -> dict[str, str]:
+    """Return for each version of the code by which a newer one drives alike the name of the newest such one."""
+    newer: dict[str, str] = {}
+    for row in reversed(read(ALIKE, ("as",), any_code=True)):
+        code: str = row["code"]
+        newer.setdefault(row["as"], newer.get(code, code))
+    return newer
 
 
 def newest(path: Path, each: str = "") -> list[Row]:
@@ -103,11 +117,11 @@ def append(path: Path, rows: Iterable[Row]) -> list[Row]:
 
 
 @lru_cache
-def fingerprint() -> str:
+def fingerprint(folder: Path = HERE) -> str:
     """Return a fingerprint of the code that decides a trial: its comments and docstrings decide nothing."""
     digest = hashlib.sha256()
     for room in ("slam", "explore", "sim"):
-        for path in sorted((HERE / room).rglob("*.py")):
+        for path in sorted((folder / room).rglob("*.py")):
             digest.update(code_alone(path.read_text()).encode())
     return digest.hexdigest()[:12]
 
