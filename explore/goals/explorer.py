@@ -206,8 +206,7 @@ class Explorer:
 
     def _keep_within(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
         """Set aside what lies beyond the fence."""
-        candidates = self._candidates(ends)
-        if around.free_space.config.fence is None or not candidates:
+        if around.free_space.config.fence is None or not (candidates := self._candidates(ends)):
             return
         within = around.free_space.is_within(np.array([end.position_world for end in candidates]))
         for end, is_within in zip(candidates, within, strict=True):
