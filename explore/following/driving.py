@@ -34,14 +34,26 @@ class Controller:
 
     def __init__(self, config: DrivingConfig) -> None:
         self._config, self._plan = config, _NO_PLAN
+        self._commands, self._motions = motions_of(config)
 
     def command(self, around: Surroundings, field: Field) -> MotionCommand | None:
         """Return the next step, or None where no safe one leads on."""
         config, pose, unseen = self._config, around.pose_world, out_of_view(around, self._config)
         points, unseen = to_world(obstacles(around, config), pose), to_world(unseen, pose) if len(unseen) else unseen
-        plan = next_steps(pose, self._plan, points, unseen, motions_of(config)[1], field, config.better_m)
+        plan = next_steps(pose, self._plan, points, unseen, self._motions, field, config.better_m)
         self._plan = plan[1:]
-        return careful(int(plan[0]), around, config) if len(plan) else None
+        return self._careful(int(plan[0]), around) if len(plan) else None
+
+    def _careful(self, step: int, around: Surroundings) -> MotionCommand:
+        """Return the command of a step, shortened where its end would cover floor that was not seen yet."""
+        config, command = self._config, self._commands[step]
+        if abs(command.forward_m) > config.careful_m:
+            end = after(around.pose_world, step, self._motions)
+            rim = config.radius_m * _RIM if config.robot.outline_m is None else rim_of(config.robot, end[2])
+            if around.free_space.unknown_at(end[:2] + rim).any():
+                share = config.careful_m / abs(command.forward_m)
+                return MotionCommand(share * command.forward_m, share * command.turn_rad)
+        return command
 
 
 class Pilot:
@@ -141,16 +153,3 @@ def keeps_clear(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], 
     ways = [arc(share * command.forward_m, share * command.turn_rad) for share in ON_THE_WAY]
     motions = motions_of(config)[1]
     return all(clearance_m(x, y, heading, beside, motions, 1.0) >= config.clear_m for x, y, heading in ways)
-
-
-def careful(step: int, around: Surroundings, config: DrivingConfig) -> MotionCommand:
-    """Return the command of a step, shortened where its end would cover floor that was not seen yet."""
-    commands, motions = motions_of(config)
-    command = commands[step]
-    if abs(command.forward_m) > config.careful_m:
-        end = after(around.pose_world, step, motions)
-        rim = config.radius_m * _RIM if config.robot.outline_m is None else rim_of(config.robot, end[2])
-        if np.any(around.free_space.unknown_at(end[:2] + rim)):
-            share = config.careful_m / abs(command.forward_m)
-            return MotionCommand(share * command.forward_m, share * command.turn_rad)
-    return command

@@ -218,8 +218,8 @@ def search(
     parent, by = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
     steps_m, horizon_m = motions.places[:, -1, :2], motions.horizon_m
     longest_m = math.sqrt(np.max(np.sum(steps_m**2, axis=1)))
-    side, turns = int(2.0 * (horizon_m + longest_m) / motions.apart_m) + 2, int(2.0 * math.pi / motions.apart_rad) + 2
-    seen = np.zeros((side, side, turns), np.float32)
+    side = int(2.0 * (horizon_m + longest_m) / motions.apart_m) + 2
+    latest, below, turns = np.zeros((side, side), np.int16), np.empty(MOST, np.int16), np.empty(MOST, np.int16)
     poses[0], spent[0], parent[0], count, found = start, 0.0, -1, 1, 0
     clear[0] = clearance_m(start[0], start[1], start[2], points, motions, motions.wide_m)
     first_m = min(_rest_m(start[0], start[1], start[2], field, motions), 1e6)
@@ -239,15 +239,18 @@ def search(
             row = int((to[1] - start[1] + horizon_m + longest_m) / motions.apart_m)
             column = int((to[0] - start[0] + horizon_m + longest_m) / motions.apart_m)
             turn = int((to[2] + math.pi) / motions.apart_rad + 0.5)
-            cost = spent[node] + motions.costs_m[a]
-            if 0.0 < seen[row, column, turn] <= cost:
+            cost, same = spent[node] + motions.costs_m[a], latest[row, column]
+            while same > 0 and turns[same] != turn:
+                same = below[same]
+            seen = np.float32(spent[same]) if same > 0 else np.float32(np.inf)
+            if seen <= cost:
                 continue
             rest_m = _rest_m(to[0], to[1], to[2], field, motions)
             room_m = step_room_m(pose, a, clear[node], near, motions) if math.isfinite(rest_m) else -math.inf
             cost = spent[node] + motions.costs_m[a] * _narrow(room_m, motions)
-            if not math.isfinite(cost) or 0.0 < seen[row, column, turn] <= cost:
+            if not math.isfinite(cost) or seen <= cost:
                 continue
-            seen[row, column, turn] = cost
+            latest[row, column], below[count], turns[count] = count, latest[row, column], turn
             poses[count], spent[count], parent[count], by[count] = to, cost, node, a
             clear[count] = clearance_m(to[0], to[1], to[2], near, motions, motions.wide_m)
             if rest_m + cost / 8.0 < best_m:
