@@ -10,7 +10,7 @@ from chainslam.slam.geometry.lines import normals
 from chainslam.slam.robot import RobotSpec
 
 from ..floor.free_space import FreeSpace
-from .grid_kernels import block_cells, blocks_with_any, cheapest_ways
+from .grid_kernels import block_cells, blocks_with_any, cheapest_ways, metres_from
 from .passable import PathConfig, passable, roomy
 
 DIRECTIONS = 16
@@ -110,14 +110,8 @@ class DrivingField:
         return _Reach(first, np.pad(lengths * self._side_m, 1, constant_values=np.inf))
 
     def _lookup(self, reach: _Reach, places_world: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
-        position = (places_world - self._free_space.origin_world)[:, ::-1] / self._side_m - reach.first_block
-        near = np.clip(np.floor(position).astype(np.int64), -1, np.array(reach.metres.shape) - 2)
-        best = np.full(len(places_world), np.inf)
-        for offset in np.ndindex(3, 3):
-            block = np.clip(near + np.array(offset), 0, np.array(reach.metres.shape) - 1)
-            gap = np.hypot(*(position - (block - 0.5)).T) * self._side_m
-            best = np.minimum(best, reach.metres[tuple(block.T)] + gap)
-        return best
+        places = (places_world - self._free_space.origin_world)[:, ::-1] / self._side_m - reach.first_block
+        return metres_from(reach.metres, places, self._side_m)
 
 
 def _box(centre: np.ndarray, reach: int) -> tuple[slice, slice]:

@@ -41,6 +41,21 @@ def cells_of(blocks: Bool[np.ndarray, "p q"], shape: tuple[int, ...], block: int
 
 
 @compiled
+def metres_from(
+    metres: Float[np.ndarray, "p q"], places: Float[np.ndarray, "n 2"], side_m: float
+) -> Float[np.ndarray, " n"]:
+    """Return the least of what the nine blocks at each place (row, column) have and of how far their middles are."""
+    (h, w), best = metres.shape, np.full(len(places), np.inf)
+    for n in range(len(places)):
+        row, column = (min(max(math.floor(places[n, 0]), -1), h - 2), min(max(math.floor(places[n, 1]), -1), w - 2))
+        for r in range(max(row, 0), min(row + 3, h)):
+            for c in range(max(column, 0), min(column + 3, w)):
+                gap_m = math.hypot(places[n, 0] - (r - 0.5), places[n, 1] - (c - 0.5)) * side_m
+                best[n] = min(best[n], metres[r, c] + gap_m)
+    return best
+
+
+@compiled
 def _put(tree: Float[np.ndarray, " t"], leaf: int, value: float) -> None:
     """Set a leaf of a tree in which each node has the least value of the two below it."""
     tree[leaf] = value

@@ -179,7 +179,7 @@ EXPLORATION = (
     _off("round things", "ends on a curved obstacle are given up without a view",
          (EXPLORER, "elif looks and is_round(end, around.walls, self._config.round_things):", "elif False:")),
     _off("patience", "a place is given up after the steps of a way of 60 m",
-         (EXPLORER, "return steps <= self._config.patience_steps", "return True")),
+         (EXPLORER, "return steps <= self._patience_steps", "return True")),
     _off("sweep", "after the last open end the robot visits unseen floor and obstacles that are no wall of the map",
          ("explore.goals.explorer_config", "sweep: bool = True", "sweep: bool = False")),
 )  # fmt: skip

@@ -10,6 +10,7 @@ from chainslam.explore.planning.grid_kernels import (
     blocks_with_any,
     cells_of,
     cheapest_ways,
+    metres_from,
     outwards,
     way_back,
 )
@@ -61,3 +62,12 @@ def test_a_field_goes_on_outwards_at_a_set_cost():
     wide = outwards(metres, 3, 0.25)
     assert np.array_equal(wide[..., 0], np.where(off <= 3, 1.0 + 0.25 * off, np.inf))
     assert np.all(wide[..., 1] == np.inf)
+
+
+def test_metres_are_the_least_of_those_of_the_nine_blocks_around():
+    rng = np.random.default_rng(3)
+    metres, places = rng.uniform(0.0, 3.0, (6, 9)), rng.uniform(-3.0, 11.0, (200, 2))
+    for place, found in zip(places, metres_from(metres, places, 0.2), strict=True):
+        own = np.clip(np.floor(place).astype(int), -1, (4, 7)) + 1
+        blocks = [(r, c) for r, c in np.ndindex(6, 9) if max(abs(r - own[0]), abs(c - own[1])) <= 1]
+        assert found == min(metres[block] + 0.2 * np.hypot(*(place - (np.array(block) - 0.5))) for block in blocks)
