@@ -5,14 +5,14 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float
 
-from chainslam.slam.geometry.poses import arc, compose, to_world, wrap
+from chainslam.slam.geometry.poses import arc, to_world, wrap
 from chainslam.slam.robot import MotionCommand, RobotSpec
 from chainslam.slam.robot.body import reaches_m, rim_of
 
 from ..floor.accumulated_returns import steadied
 from ..planning.paths import Field, Path
 from .driving_config import DrivingConfig
-from .motion_kernels import Motions, cells_ahead, clearance_m, cost_of_plan, search, step_room_m
+from .motion_kernels import Motions, after, clearance_m, is_at_end, next_steps, step_room_m
 from .surroundings import Surroundings
 
 _NOTHING = np.zeros((0, 2))
@@ -34,22 +34,26 @@ class Controller:
 
     def __init__(self, config: DrivingConfig) -> None:
         self._config, self._plan = config, _NO_PLAN
+        self._commands, self._motions = motions_of(config)
 
     def command(self, around: Surroundings, field: Field) -> MotionCommand | None:
-        """Return the next step, or None where no safe one leads on.
-
-        The plan is kept until a single step is left or it is not safe any more, and where another is not better.
-        """
-        config, (commands, motions), pose = self._config, motions_of(self._config), around.pose_world
-        points, unseen = (to_world(places(around, config), pose) for places in (obstacles, out_of_view))
-        plan, cost_m = self._plan, cost_of_plan(pose, self._plan, points, unseen, motions, field)
-        if len(plan) < 2 or not np.isfinite(cost_m):
-            found = search(pose, points, unseen, motions, field, config.better_m)
-            found_m = cost_of_plan(pose, found, points, unseen, motions, field)
-            if found_m < cost_m - config.better_m or not np.isfinite(cost_m):
-                plan = found
+        """Return the next step, or None where no safe one leads on."""
+        config, pose, unseen = self._config, around.pose_world, out_of_view(around, self._config)
+        points, unseen = to_world(obstacles(around, config), pose), to_world(unseen, pose) if len(unseen) else unseen
+        plan = next_steps(pose, self._plan, points, unseen, self._motions, field, config.better_m)
         self._plan = plan[1:]
-        return careful(commands[plan[0]], around, config) if len(plan) else None
+        return self._careful(int(plan[0]), around) if len(plan) else None
+
+    def _careful(self, step: int, around: Surroundings) -> MotionCommand:
+        """Return the command of a step, shortened where its end would cover floor that was not seen yet."""
+        config, command = self._config, self._commands[step]
+        if abs(command.forward_m) > config.careful_m:
+            end = after(around.pose_world, step, self._motions)
+            rim = config.radius_m * _RIM if config.robot.outline_m is None else rim_of(config.robot, end[2])
+            if around.free_space.unknown_at(end[:2] + rim).any():
+                share = config.careful_m / abs(command.forward_m)
+                return MotionCommand(share * command.forward_m, share * command.turn_rad)
+        return command
 
 
 class Pilot:
@@ -63,8 +67,7 @@ class Pilot:
 
     def arrived(self, pose_world: Float[np.ndarray, "3"]) -> bool:
         """Return whether the robot stands where nothing is left of the way."""
-        here = cells_ahead(pose_world[0], pose_world[1], 1, self._field)
-        return bool(np.any(self._field.metres[tuple(here.T)] <= 0.0))
+        return is_at_end(pose_world[0], pose_world[1], self._field)
 
     def command(self, around: Surroundings) -> MotionCommand | None:
         """Return the next step along the path, or None where no safe one leads on."""
@@ -150,13 +153,3 @@ def keeps_clear(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], 
     ways = [arc(share * command.forward_m, share * command.turn_rad) for share in ON_THE_WAY]
     motions = motions_of(config)[1]
     return all(clearance_m(x, y, heading, beside, motions, 1.0) >= config.clear_m for x, y, heading in ways)
-
-
-def careful(command: MotionCommand, around: Surroundings, config: DrivingConfig) -> MotionCommand:
-    """Shorten a step whose end would cover floor that was not seen yet."""
-    end = compose(around.pose_world, arc(command.forward_m, command.turn_rad))
-    rim = config.radius_m * _RIM if config.robot.outline_m is None else rim_of(config.robot, end[2])
-    share = min(config.careful_m / max(abs(command.forward_m), 1e-9), 1.0)
-    if share < 1.0 and np.any(around.free_space.unknown_at(end[:2] + rim)):
-        return MotionCommand(share * command.forward_m, share * command.turn_rad)
-    return command

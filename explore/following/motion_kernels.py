@@ -117,6 +117,13 @@ def cells_ahead(x: float, y: float, count: int, field: Field) -> Int[np.ndarray,
 
 
 @compiled
+def is_at_end(x: float, y: float, field: Field) -> bool:
+    """Return whether nothing is left of the way at a place."""
+    ahead = cells_ahead(x, y, 1, field)
+    return len(ahead) > 0 and field.metres[ahead[0, 0], ahead[0, 1], 0] <= 0.0
+
+
+@compiled
 def _rest_m(x: float, y: float, heading: float, field: Field, motions: Motions) -> float:
     """Return what the way from a pose costs: the field and, for a disc, the turn to face the way on."""
     metres = metres_at(x, y, heading, field)
@@ -211,8 +218,8 @@ def search(
     parent, by = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
     steps_m, horizon_m = motions.places[:, -1, :2], motions.horizon_m
     longest_m = math.sqrt(np.max(np.sum(steps_m**2, axis=1)))
-    side, turns = int(2.0 * (horizon_m + longest_m) / motions.apart_m) + 2, int(2.0 * math.pi / motions.apart_rad) + 2
-    seen = np.zeros((side, side, turns), np.float32)
+    side = int(2.0 * (horizon_m + longest_m) / motions.apart_m) + 2
+    latest, below, turns = np.zeros((side, side), np.int16), np.empty(MOST, np.int16), np.empty(MOST, np.int16)
     poses[0], spent[0], parent[0], count, found = start, 0.0, -1, 1, 0
     clear[0] = clearance_m(start[0], start[1], start[2], points, motions, motions.wide_m)
     first_m = min(_rest_m(start[0], start[1], start[2], field, motions), 1e6)
@@ -220,9 +227,8 @@ def search(
     while len(queue) > 0 and count + len(steps_m) <= MOST:
         _, node = heappop(queue)
         pose = poses[node].copy()
-        ahead = cells_ahead(pose[0], pose[1], 1, field)
-        is_end = len(ahead) > 0 and field.metres[ahead[0, 0], ahead[0, 1], 0] <= 0.0
-        if node > 0 and (is_end or math.hypot(pose[0] - start[0], pose[1] - start[1]) >= horizon_m):
+        is_far = math.hypot(pose[0] - start[0], pose[1] - start[1]) >= horizon_m
+        if node > 0 and (is_far or is_at_end(pose[0], pose[1], field)):
             found = node
             break
         reach_m = longest_m + motions.radius_m + motions.wide_m
@@ -233,15 +239,18 @@ def search(
             row = int((to[1] - start[1] + horizon_m + longest_m) / motions.apart_m)
             column = int((to[0] - start[0] + horizon_m + longest_m) / motions.apart_m)
             turn = int((to[2] + math.pi) / motions.apart_rad + 0.5)
-            cost = spent[node] + motions.costs_m[a]
-            if 0.0 < seen[row, column, turn] <= cost:
+            cost, same = spent[node] + motions.costs_m[a], latest[row, column]
+            while same > 0 and turns[same] != turn:
+                same = below[same]
+            seen = np.float32(spent[same]) if same > 0 else np.float32(np.inf)
+            if seen <= cost:
                 continue
             rest_m = _rest_m(to[0], to[1], to[2], field, motions)
             room_m = step_room_m(pose, a, clear[node], near, motions) if math.isfinite(rest_m) else -math.inf
             cost = spent[node] + motions.costs_m[a] * _narrow(room_m, motions)
-            if not math.isfinite(cost) or 0.0 < seen[row, column, turn] <= cost:
+            if not math.isfinite(cost) or seen <= cost:
                 continue
-            seen[row, column, turn] = cost
+            latest[row, column], below[count], turns[count] = count, latest[row, column], turn
             poses[count], spent[count], parent[count], by[count] = to, cost, node, a
             clear[count] = clearance_m(to[0], to[1], to[2], near, motions, motions.wide_m)
             if rest_m + cost / 8.0 < best_m:
@@ -255,3 +264,27 @@ def search(
         plan[at] = by[found]
         found = parent[found]
     return plan[at:]
+
+
+@compiled
+def next_steps(
+    pose: Float[np.ndarray, "3"],
+    plan: Int[np.ndarray, " n"],
+    points: Float[np.ndarray, "m 2"],
+    first: Float[np.ndarray, "f 2"],
+    motions: Motions,
+    field: Field,
+    gain_m: float,
+) -> Int[np.ndarray, " k"]:
+    """Return the steps of a plan or, where a single one is left or one is not safe, those of a search, if better."""
+    longest_m = math.sqrt(np.max(np.sum(motions.places[:, -1, :2] ** 2, axis=1)))
+    way_m = max(motions.horizon_m, len(plan) * longest_m) + longest_m
+    reach_m = way_m + motions.radius_m + motions.wide_m
+    points = points[(points[:, 0] - pose[0]) ** 2 + (points[:, 1] - pose[1]) ** 2 < reach_m**2]
+    cost_m = cost_of_plan(pose, plan, points, first, motions, field)
+    if len(plan) < 2 or not math.isfinite(cost_m):
+        found = search(pose, points, first, motions, field, gain_m)
+        found_m = cost_of_plan(pose, found, points, first, motions, field)
+        if found_m < cost_m - gain_m or not math.isfinite(cost_m):
+            return found
+    return plan

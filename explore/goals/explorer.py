@@ -48,6 +48,7 @@ class Explorer:
 
     def __init__(self, strategy: Strategy, start_world: Float[np.ndarray, 2], config: ExplorerConfig) -> None:
         self._start, self._config = start_world, config
+        self._near_m, self._patience_steps = config.near_m, config.patience_steps
         self._step = -1
         self._tries = SecondTries(config)
         self._task: _Task | None = None
@@ -94,7 +95,7 @@ class Explorer:
         self._keep_within(around, ends)
         self._abandon(around, ends)
         command, task = self._command(around, chains, ends, graph), self._task
-        given_up = GivenUp(tuple(self._set_aside.values()), tuple(self._left), self._config.near_m)
+        given_up = GivenUp(tuple(self._set_aside.values()), tuple(self._left), self._near_m)
         if command is not None and task is None:
             return Decision(command, "", given_up=given_up)
         if command is not None and task is not None:
@@ -168,7 +169,7 @@ class Explorer:
 
         def spent(place_world: Float[np.ndarray, 2]) -> int:
             """Return how many steps were spent on goals at a place."""
-            return int(efforts[np.hypot(*(efforts[:, :2] - place_world).T) < self._config.near_m, 2].sum())
+            return int(efforts[np.hypot(*(efforts[:, :2] - place_world).T) < self._near_m, 2].sum())
 
         looks = self._config.following.method == "viewpoints"
         for end in self._candidates(ends):
@@ -206,8 +207,7 @@ class Explorer:
 
     def _keep_within(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
         """Set aside what lies beyond the fence."""
-        candidates = self._candidates(ends)
-        if around.free_space.config.fence is None or not candidates:
+        if around.free_space.config.fence is None or not (candidates := self._candidates(ends)):
             return
         within = around.free_space.is_within(np.array([end.position_world for end in candidates]))
         for end, is_within in zip(candidates, within, strict=True):
@@ -215,7 +215,7 @@ class Explorer:
                 self._put_aside(end, "beyond the fence")
 
     def _is_patient(self, steps: int) -> bool:
-        return steps <= self._config.patience_steps
+        return steps <= self._patience_steps
 
     def _put_aside(self, end: OpenEnd, reason: str) -> None:
         self._set_aside[end.wall, end.side] = SetAside(end.wall, end.side, end.position_world, reason)
@@ -223,10 +223,10 @@ class Explorer:
     def _give_up(self, task: _Task, ends: dict[Key, OpenEnd]) -> None:
         """Set the goal aside with the reason."""
         errand, target, views = task.errand, task.choice.target, task.errand.looks_done
-        late = "" if self._is_patient(task.steps) else f"not reached in {self._config.patience_steps} steps"
+        late = "" if self._is_patient(task.steps) else f"not reached in {self._patience_steps} steps"
         if isinstance(target, Place):
             self._left.append(LeftPlace(target.centre_world, late or errand.trouble))
-            task.steps += int(np.ceil(IN_VAIN * self._config.patience_steps))
+            task.steps += int(np.ceil(IN_VAIN * self._patience_steps))
         elif isinstance(errand, PaperErrand):
             for side in (TAIL, HEAD):
                 if (end := ends.get((target.wall, side))) is not None:

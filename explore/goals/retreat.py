@@ -54,7 +54,7 @@ class Retreat:
 
     def __init__(self, inner: Decider, floor: FloorMemory, config: RetreatConfig, following: FollowingConfig) -> None:
         self._inner, self._floor, self._config, self._following = inner, floor, config, following
-        self._driven: list[MotionCommand] = []
+        self._driven: list[Odometry] = []
         self._touches = Touches(config.robot)
         self._back_m, self._why = 0.0, ""
         self._step, self._rounds, self._since_m = -1, 0, np.inf
@@ -67,7 +67,7 @@ class Retreat:
         self._touches.move(odometry, command)
         self._was_back = bool(self._why)
         if not self._was_back:
-            self._driven.append(_arc_of(odometry))
+            self._driven.append(odometry)
 
     def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
         """Return what to do next: back out of a touch, what the inner decider says, or back where that is no way."""
@@ -77,7 +77,8 @@ class Retreat:
         back = self._back(around)
         if back is not None:
             return back
-        around = replace(around, touched_robot=self._touches.points_robot)
+        if len(touched := self._touches.points_robot):
+            around = replace(around, touched_robot=touched)
         self._decided = self._inner.decide(around, chains, graph)
         if self._decided.command is not None:
             return self._decided
@@ -106,7 +107,7 @@ class Retreat:
     def _back(self, around: Surroundings) -> Decision | None:
         """Return the step that undoes the last one; None where that is done, or where something has come in between."""
         if self._why and self._driven and self._back_m > 0.0:
-            last = self._driven.pop()
+            last = _arc_of(self._driven.pop())
             self._back_m -= abs(last.forward_m)
             command = MotionCommand(-last.forward_m, -last.turn_rad)
             may = command.forward_m >= 0.0 or self._config.robot.can_reverse

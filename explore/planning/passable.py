@@ -13,7 +13,7 @@ from chainslam.slam.geometry.quantities import Distance, Size, Weight
 from chainslam.slam.robot import RobotSpec, of_robot
 
 from ..floor.free_space import FreeSpace
-from .coarse_grid import block_cells, blocks_with_any
+from .grid_kernels import block_cells, blocks_with_any
 
 COAST_SHARE = 0.75
 """Of the scanner's range: farther from walls than this it sees too few beams of them."""
