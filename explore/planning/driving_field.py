@@ -5,20 +5,19 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from skimage.graph import MCP_Geometric
 
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.robot import RobotSpec
 
 from ..floor.free_space import FreeSpace
-from .grid_kernels import block_cells, blocks_with_any, cheapest_ways, metres_from
+from .grid_kernels import block_cells, blocks_with_any, metres_from
 from .passable import PathConfig, passable, roomy
 
 DIRECTIONS = 16
 """Places on a ring."""
 NEAR_M = 8.0
 """The search goes so far first; most of what is asked for is nearer, and a whole building costs far more."""
-NOWHERE = np.zeros((0, 2), dtype=np.int64)
-"""The search ends at no block."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ class DrivingField:
             blocks[tuple(start)] = True
             away = int(np.ceil(self._config.escape_m / self._side_m))
             starts = np.argwhere(blocks[_box(start, away)]) + np.maximum(start - away, 0)
-        lengths, _ = cheapest_ways(np.where(blocks, 1.0, -1.0), starts, NOWHERE)
+        lengths, _ = MCP_Geometric(np.where(blocks, 1.0, -1.0)).find_costs([tuple(b) for b in starts.tolist()])
         return _Reach(first, np.pad(lengths * self._side_m, 1, constant_values=np.inf))
 
     def _lookup(self, reach: _Reach, places_world: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:

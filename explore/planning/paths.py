@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import label
+from skimage.graph import MCP_Geometric
 
 from ..floor.free_space import FreeSpace
-from .grid_kernels import block_cells, blocks_with_any, cells_of, cheapest_ways, outwards, way_back
+from .grid_kernels import block_cells, blocks_with_any, cells_of, outwards
 from .headings import Ground, Room, cheapest
 from .passable import PathConfig, blind_blocks, metre_costs, passable
 
@@ -101,14 +102,17 @@ class Planner:
         squeezed = np.where(self._passable_blocks, 1.0 + self._config.squeeze_cost, -1.0)
         costs = np.where(self._roomy_blocks, 1.0, squeezed)
         costs[self._blind_blocks & (costs > 0.0)] += self._config.blind_cost
-        ends = goals // self._block
-        lengths, before = cheapest_ways(costs, self._start[None] // self._block, ends)
-        best = int(np.argmin(lengths[tuple(ends.T)]))
-        if not np.isfinite(lengths[tuple(ends[best])]):
+        ends = np.unique(goals // self._block, axis=0)
+        search = MCP_Geometric(costs)
+        here = tuple(self._start // self._block)
+        lengths, _ = search.find_costs([here], [tuple(end) for end in ends], find_all_ends=False)
+        at_ends = lengths[tuple(ends.T)]
+        best = int(np.argmin(at_ends))
+        if not np.isfinite(at_ends[best]):
             return None
         corridor = np.zeros(costs.shape, dtype=bool)
         beside = int(np.ceil(BESIDE_M / (self._block * self._free_space.config.cell_m) - 1e-9))
-        for r, c in way_back(before, *ends[best]):
+        for r, c in search.traceback(tuple(ends[best])):
             corridor[max(r - beside, 0) : r + beside + 1, max(c - beside, 0) : c + beside + 1] = True
         return corridor
 
@@ -131,10 +135,11 @@ class Planner:
                 return None
             way, _, costs = found
         else:
-            lengths, before = cheapest_ways(metre, goals, goals[:0])
-            if not np.isfinite(lengths[tuple(start)]):
+            search = MCP_Geometric(metre)
+            costs = search.find_costs([tuple(goal) for goal in goals.tolist()])[0][..., None]
+            if not np.isfinite(costs[tuple(start)]):
                 return None
-            way, costs = way_back(before, *start), lengths[..., None]
+            way = np.array(search.traceback(tuple(start.tolist())), dtype=np.int64)[::-1]
         cell_m = self._free_space.config.cell_m
         cost = cell_m * float(costs[tuple(start)].min())
         corner_world = self._free_space.origin_world + cell_m * (corner + self._corner)[::-1]

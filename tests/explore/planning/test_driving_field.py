@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import shapely
+from skimage.graph import MCP_Geometric
 
 from chainslam.explore.floor.free_space import FreeSpace
 from chainslam.explore.planning import driving_field
 from chainslam.explore.planning.driving_field import DrivingField
-from chainslam.explore.planning.grid_kernels import cheapest_ways
 from chainslam.explore.planning.passable import PathConfig
 from chainslam.explore.planning.paths import Planner
 from chainslam.sim.lidar import LidarConfig, RangeFinder
@@ -88,11 +88,11 @@ def test_what_is_near_is_found_without_a_search_of_the_whole_building(monkeypatc
     for x in np.arange(0.0, 40.0, 1.0):
         grid.integrate(np.array([x, 0.0, 0.0]), Scan(beams, np.full(180, np.inf), 0.01, 4.0, 0.0))
 
-    def noted(costs, starts, ends):
-        searched.append(costs.shape)
-        return cheapest_ways(costs, starts, ends)
+    def noted(blocks):
+        searched.append(blocks.shape)
+        return MCP_Geometric(blocks)
 
-    monkeypatch.setattr(driving_field, "cheapest_ways", noted)
+    monkeypatch.setattr(driving_field, "MCP_Geometric", noted)
     places = np.array([[22.0, 1.0], [23.0, 0.0], [39.0, 0.0]])
     nearest = DrivingField(grid, np.array([20.0, 0.0]), LENGTH)
     near = nearest.metres(places, beyond_nearest=False)

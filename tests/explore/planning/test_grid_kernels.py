@@ -2,17 +2,14 @@
 
 import numpy as np
 import pytest
-from skimage.graph import MCP_Geometric
 
 from chainslam.explore.planning.grid_kernels import (
     MOST_CELLS,
     block_cells,
     blocks_with_any,
     cells_of,
-    cheapest_ways,
     metres_from,
     outwards,
-    way_back,
 )
 
 CELL_M = 0.05
@@ -36,23 +33,6 @@ def test_blocks_hold_what_their_cells_hold(block):
     assert np.all(again[cells])
     for row, column in np.argwhere(blocks):
         assert cells[row * block : (row + 1) * block, column * block : (column + 1) * block].any()
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_of_ways_that_cost_the_same_the_one_that_skimage_takes_is_found(seed):
-    rng = np.random.default_rng(seed)
-    costs = rng.integers(1, 4, rng.integers(1, 40, 2)).astype(float)
-    costs[rng.random(costs.shape) < 0.3] = -1.0
-    costs[0, 0] = 1.0
-    free = np.argwhere(costs > 0.0)
-    starts, ends = (free[rng.integers(len(free), size=n)] for n in (5, 4 * (seed % 2)))
-    found, before = cheapest_ways(costs, starts, ends)
-    search = MCP_Geometric(costs)
-    at = [[tuple(cell) for cell in cells.tolist()] for cells in (starts, ends)]
-    lengths, _ = search.find_costs(at[0], at[1] or None, find_all_ends=False)
-    assert np.array_equal(found, lengths)
-    for cell in np.argwhere(np.isfinite(found)).tolist():
-        assert way_back(before, *cell)[::-1].tolist() == [list(each) for each in search.traceback(tuple(cell))]
 
 
 def test_a_field_goes_on_outwards_at_a_set_cost():

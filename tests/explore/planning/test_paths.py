@@ -6,10 +6,10 @@ import networkx as nx
 import numpy as np
 import pytest
 import shapely
+from skimage.graph import MCP_Geometric
 
 from chainslam.explore.floor.free_space import FreeSpace
 from chainslam.explore.planning import paths
-from chainslam.explore.planning.grid_kernels import cheapest_ways
 from chainslam.explore.planning.passable import PathConfig
 from chainslam.explore.planning.paths import Planner
 from chainslam.explore.planning.sight import cells_within, sees
@@ -204,11 +204,11 @@ def test_a_path_is_sought_only_around_the_shortest_way_by_blocks(seed, monkeypat
     _, grid, places = explored(seed)
     searched = []
 
-    def noted(costs, starts, ends):
+    def noted(costs):
         searched.append(int(np.count_nonzero(costs > 0)))
-        return cheapest_ways(costs, starts, ends)
+        return MCP_Geometric(costs)
 
-    monkeypatch.setattr(paths, "cheapest_ways", noted)
+    monkeypatch.setattr(paths, "MCP_Geometric", noted)
     planner, floor = Planner(grid, places[0], CONFIG), int(np.count_nonzero(grid.evidence < 0))
     near = places[np.argsort(np.hypot(*(places - places[0]).T))[1:6]]
     assert planner.to(near) is not None
@@ -229,11 +229,11 @@ def test_what_only_blocks_connect_costs_no_search_of_the_whole_floor(seed, monke
     beyond[planner._is_connected] = False
     cells = np.argwhere(beyond)
 
-    def noted(costs, starts, ends):
+    def noted(costs):
         searched.append(int(np.count_nonzero(costs > 0)))
-        return cheapest_ways(costs, starts, ends)
+        return MCP_Geometric(costs)
 
-    monkeypatch.setattr(paths, "cheapest_ways", noted)
+    monkeypatch.setattr(paths, "MCP_Geometric", noted)
     assert planner.to(grid.points(cells + planner._corner)) is None
     assert len(searched) == 2
     others = np.argwhere(planner._is_connected)
