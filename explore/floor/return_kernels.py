@@ -88,10 +88,10 @@ def same_places(
     same = np.zeros((len(near), len(recent)))
     for n in range(len(near)):
         p = near[n]
-        bearing = math.atan2(points[p, 1], points[p, 0])
+        bearing, apart_m = math.atan2(points[p, 1], points[p, 0]), same_m[p] + rho[p] * same_rad
         for r in range(len(recent)):
-            if abs(rho[p] - before[r]) < same_m[p] and abs(wrapped(bearing - at[r])) < same_rad:
-                same[n, r] = 1.0
+            if abs(points[p, 0] - recent[r, 0]) < apart_m and abs(rho[p] - before[r]) < same_m[p]:
+                same[n, r] = abs(wrapped(bearing - at[r])) < same_rad
     return near, rho[near], before, same
 
 
