@@ -192,7 +192,7 @@ class SimulatedRobot:
         people = self._people.places_at(self._time_s)
         seen = hidden_by(ranges, bearings + scanner_world[2], scanner_world[:2], people, faults.people.radius_m)
         seen = with_posts(seen, bearings, faults)
-        return seen, np.where(seen < ranges, -1, faces)
+        return seen, faces if seen is ranges else np.where(seen < ranges, -1, faces)
 
     def drive(self, command: MotionCommand) -> Odometry:
         """Carry out one command, shortened to the longest step (`clamp`), and return what the wheels report.
