@@ -83,11 +83,6 @@ def ride_mission(robot: Robot, mapper: Mapper, scans: int, cut_short: str = "", 
     return driven_mission(robot, mapper, ReplayDriver(scans, LostConfig(mapper.config.robot), cut_short, unread), None)
 
 
-def _working_s() -> float:
-    """Return the processor time so far, s, without that of the compiler."""
-    return time.thread_time() - compiling_s()
-
-
 def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None) -> Iterator[Step]:
     """Map what a robot senses while somebody drives it, and yield each step; without `floor` nobody keeps it."""
     spec = mapper.config.robot
@@ -97,7 +92,7 @@ def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMem
     given_up = GivenUp()
     path_length, index = 0.0, 0
     while True:
-        began = _working_s()
+        began_s = time.thread_time() - compiling_s()
         sensed = robot.sense() if floor is None else lost.believed(robot.sense())
         update = mapper.step(sensed, given_up.keys)
         scan = sensed if update.heard is None else update.heard.scan
@@ -108,7 +103,7 @@ def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMem
                 floor.move(localisation.unstated_motion)
         if floor is not None and not localisation.is_lost:
             floor.see(update.map.belief.pose_world, scan)
-        decides = time.thread_time()
+        decides_s = time.thread_time()
         seen = sorted({wall for wall in update.walls_of_segments.tolist() if wall >= 0})
         if not localisation.is_lost:
             graph.observe(update.map, update.chains, followed_wall(update.map), seen)
@@ -129,7 +124,7 @@ def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMem
         given_up = decision.given_up
         if decision.outcome is Outcome.ALL_CLOSED and not update.chains:
             decision = replace(decision, outcome=Outcome.NO_WALL, words="no wall was found")
-        decided = time.thread_time() - decides
+        decided_s = time.thread_time()
         yield Step(
             index=index,
             time_s=scan.time_s,
@@ -146,8 +141,8 @@ def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMem
             graph=graph.graph,
             decision=decision,
             path_length_m=path_length,
-            seconds=_working_s() - began,
-            planning_seconds=decided,
+            seconds=decided_s - compiling_s() - began_s,
+            planning_seconds=decided_s - decides_s,
             robot=spec,
             own_beams=0 if update.heard is None else update.heard.own_beams,
             range_errors=update.range_errors,

@@ -52,9 +52,9 @@ def true_motion(
     half = 0.5 * turn * shares
     chord = forward * shares * np.sinc(half / np.pi)
     sideways = slip.lateral_m * shares
-    x = chord * np.cos(half) - sideways * np.sin(half)
-    y = chord * np.sin(half) + sideways * np.cos(half)
-    return np.stack([x, y, turn * shares], axis=-1)
+    cos, sin, poses = np.cos(half), np.sin(half), np.empty((len(shares), 3))
+    poses[:, 0], poses[:, 1], poses[:, 2] = chord * cos - sideways * sin, chord * sin + sideways * cos, turn * shares
+    return poses
 
 
 def odometry(command: MotionCommand, config: WheelSpec) -> Odometry:

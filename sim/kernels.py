@@ -3,10 +3,13 @@
 A face is a column of `rows`: x and y of its start, of its end, the normal of its line and the line's distance.
 """
 
+import math
+
 import numpy as np
 from jaxtyping import Float, Int
 
 from chainslam.slam.geometry.compiled import compiled
+from chainslam.slam.geometry.numerics import TINY
 
 _ON_THE_VERTEX = 1e-9
 """Share of a beam step by which faces are extended, so that no beam passes between two faces that touch."""
@@ -63,3 +66,25 @@ def nearest(
         if face[beam] >= 0:
             ranges[beam] = 1.0 / best[beam]
     return ranges, face
+
+
+@compiled
+def clear_places(
+    places: Float[np.ndarray, "n 2"],
+    faces: Float[np.ndarray, "m 2 2"],
+    radius_m: float,
+    people: Float[np.ndarray, "p 2"],
+    person_m: float,
+) -> int:
+    """Return how many places, from the first on, a disc of this radius can be at clear of all faces and people."""
+    for n in range(len(places)):
+        for (ax, ay), (bx, by) in faces:
+            along_x, along_y, x, y = bx - ax, by - ay, places[n, 0] - ax, places[n, 1] - ay
+            squared = max(along_x * along_x + along_y * along_y, TINY**2)
+            share = min(max((x * along_x + y * along_y) / squared, 0.0), 1.0)
+            if math.hypot(x - share * along_x, y - share * along_y) < radius_m:
+                return n
+        for x, y in people:
+            if math.hypot(places[n, 0] - x, places[n, 1] - y) - person_m < radius_m:
+                return n
+    return len(places)

@@ -59,8 +59,9 @@ class People:
 
     def places_at(self, time_s: float) -> Float[np.ndarray, "m 2"]:
         """Return where people stand or walk now, world frame, m."""
-        standing = np.reshape(self.config.standing, (-1, 2)) if time_s < self.config.leave_s else np.zeros((0, 2))
-        return np.concatenate([self._places, standing])
+        if not self.config.standing or time_s >= self.config.leave_s:
+            return self._places
+        return np.concatenate([self._places, np.reshape(self.config.standing, (-1, 2))])
 
     def enter(self, robot_world: Float[np.ndarray, "2"], reach_m: float) -> None:
         """Let those who walk stand about the robot, each in a free place within reach that it could see."""

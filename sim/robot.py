@@ -26,6 +26,7 @@ from .faults import (
     with_mixed_pixels,
     with_posts,
 )
+from .kernels import clear_places
 from .lidar import LidarConfig, RangeFinder, beam_sigmas, noisy
 from .people import People, hidden_by
 
@@ -111,7 +112,7 @@ class SimulatedRobot:
         self._record = TrueRecord()
         self._errorless = errorless
         self._chance = chance_in(world, seed)
-        self._finder = RangeFinder(world.faces, self.config.lidar)
+        self._finder, self._scanner = RangeFinder(world.faces, self.config.lidar), self.config.true_scanner
         self._faces = np.asarray(world.faces, dtype=np.float64)
         self._near: dict[tuple[int, int], Float[np.ndarray, "m 2 2"]] = {}
         self._pose = np.array(world.start, dtype=np.float64)
@@ -172,7 +173,7 @@ class SimulatedRobot:
 
     def _cast(self, moving: bool) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
         """Return exact ranges m and faces of the beams; in a scan taken in motion, each from the pose at its time."""
-        scanner = self.config.true_scanner
+        scanner = self._scanner
         if not moving:
             at = self._pose if scanner.is_at_axle else compose(self._pose, scanner.pose_robot)
             return self._seen_from(at)
@@ -191,7 +192,7 @@ class SimulatedRobot:
         people = self._people.places_at(self._time_s)
         seen = hidden_by(ranges, bearings + scanner_world[2], scanner_world[:2], people, faults.people.radius_m)
         seen = with_posts(seen, bearings, faults)
-        return seen, np.where(seen < ranges, -1, faces)
+        return seen, faces if seen is ranges else np.where(seen < ranges, -1, faces)
 
     def drive(self, command: MotionCommand) -> Odometry:
         """Carry out one command, shortened to the longest step (`clamp`), and return what the wheels report.
@@ -206,8 +207,7 @@ class SimulatedRobot:
         count = 1 + int(np.ceil((abs(command.forward_m) + abs(slip.lateral_m)) / self.config.sampling_m))
         shares = np.linspace(0.0, 1.0, count + 1)[1:]
         motions = true_motion(command, slip, drive, shares)
-        places = np.column_stack([to_world(motions[:, :2], self._pose), motions[:, 2] + self._pose[2]])
-        free = self._free_places(places)
+        free = self._free_places(to_world(motions[:, :2], self._pose), motions[:, 2] + self._pose[2])
         touched = free < count
         if touched:
             self._record.collisions += 1
@@ -224,23 +224,16 @@ class SimulatedRobot:
         self._people.walk(duration + self.config.scan_s, self._pose[:2])
         self._way, self._drive_s = np.zeros((0, 3)) if is_stuck else motions[:free], duration
         self._record.drive_time_s += duration
-        return replace(odometry(command, drive), touched=touched)
+        reported = odometry(command, drive)
+        return replace(reported, touched=True) if touched else reported
 
-    def _free_places(self, poses_world: Float[np.ndarray, "n 3"]) -> int:
-        """Return the number of positions, from the first on, at which the body is clear of every face and person."""
-        places_world = poses_world[:, :2]
+    def _free_places(self, places_world: Float[np.ndarray, "n 2"], headings_rad: Float[np.ndarray, " n"]) -> int:
+        """Return the number of poses, from the first on, at which the body is clear of every face and person."""
         near, people = self._faces_near(places_world[0]), self._people.places_at(self._time_s)
         if self.config.outline_m is not None:
-            touched = self._touched(poses_world, near, people)
+            touched = self._touched(np.column_stack([places_world, headings_rad]), near, people)
             return int(np.argmax(touched)) if touched.any() else len(places_world)
-        gaps = np.full(len(places_world), np.inf)
-        if len(near):
-            gaps = distance_to_segments(places_world, near).min(axis=1)
-        if len(people):
-            to_people = np.hypot(*np.moveaxis(places_world[:, None] - people, -1, 0)).min(axis=1)
-            gaps = np.minimum(gaps, to_people - self.config.faults.people.radius_m)
-        touched = gaps < self.config.radius_m
-        return int(np.argmax(touched)) if touched.any() else len(places_world)
+        return clear_places(places_world, near, self.config.radius_m, people, self.config.faults.people.radius_m)
 
     def _touched(
         self,

@@ -5,8 +5,10 @@ from collections import deque
 import numpy as np
 from jaxtyping import Float
 
-from chainslam.slam.geometry.poses import to_robot, to_world, wrap
+from chainslam.slam.geometry.poses import to_robot, to_world
 from chainslam.slam.robot import Odometry, RobotSpec, Scan, ScannerSpec
+
+from .return_kernels import hits_of, same_places
 
 SCANS = 4
 """So many scans before the present one are remembered; over so few steps the odometry errs by millimetres."""
@@ -21,22 +23,20 @@ class AccumulatedReturns:
 
     def __init__(self, robot: RobotSpec = RobotSpec()) -> None:
         self._near_m, self._scanner = robot.beyond(NEAR_BEYOND_M), robot.scanner
-        self._scans: deque[Float[np.ndarray, "n 2"]] = deque(maxlen=SCANS)
+        self._counts = deque([0] * SCANS, maxlen=SCANS)
+        self.points_robot: Float[np.ndarray, "n 2"] = np.zeros((0, 2))
+        """All that is remembered, m, robot frame."""
 
     def move(self, odometry: Odometry) -> None:
         """Take note that the robot has moved."""
-        for k, points in enumerate(self._scans):
-            self._scans[k] = to_robot(points, odometry.motion)
+        self.points_robot = to_robot(self.points_robot, odometry.motion)
 
     def see(self, scan: Scan) -> None:
         """Remember what a scan hit nearby."""
         points = returns(scan, self._scanner)
-        self._scans.append(points[np.hypot(points[:, 0], points[:, 1]) < self._near_m])
-
-    @property
-    def points_robot(self) -> Float[np.ndarray, "n 2"]:
-        """All that is remembered, m, robot frame."""
-        return np.concatenate([np.zeros((0, 2)), *self._scans])
+        near = points[np.hypot(points[:, 0], points[:, 1]) < self._near_m]
+        self.points_robot = np.concatenate([self.points_robot[self._counts[0] :], near])
+        self._counts.append(len(near))
 
 
 def steadied(
@@ -48,21 +48,15 @@ def steadied(
     Between two walls the nearest of a dozen noisy returns on each side are 2.5 cm nearer than the walls.
     """
     points_robot = returns(scan, robot.scanner)
-    (rho, bearing), (before, at) = (
-        (np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])) for points in (points_robot, recent_robot)
-    )
-    near = rho < robot.beyond(NEAR_BEYOND_M)
-    turn = np.abs(wrap(bearing[near, None] - at))
-    same_m = SAME_SIGMAS * scan.sigmas_m[np.isfinite(scan.ranges_m)][near, None]
-    same = (turn < SAME_STEPS * scan.step_rad) & (np.abs(rho[near, None] - before) < same_m)
-    mean = rho.copy()
-    mean[near] = (rho[near] + same @ before) / (1.0 + np.count_nonzero(same, axis=1))
-    return np.concatenate([points_robot * (mean / np.maximum(rho, 1e-9))[:, None], recent_robot[~same.any(axis=0)]])
+    same_m = SAME_SIGMAS * scan.sigmas_m[np.isfinite(scan.ranges_m)]
+    near_m, same_rad = robot.beyond(NEAR_BEYOND_M), SAME_STEPS * scan.step_rad
+    near, rho, before, same = same_places(points_robot, same_m, recent_robot, near_m, same_rad)
+    mean = (rho + same @ before) / (1.0 + same.sum(axis=1))
+    points_robot[near] *= (mean / np.maximum(rho, 1e-9))[:, None]
+    return np.concatenate([points_robot, recent_robot[~same.any(axis=0)]])
 
 
 def returns(scan: Scan, scanner: ScannerSpec) -> Float[np.ndarray, "m 2"]:
     """Return the points that the scan of a scanner on the body hit, robot frame, m."""
-    hit = np.isfinite(scan.ranges_m)
-    bearing, distance = scan.bearings_rad[hit], scan.ranges_m[hit]
-    points = np.stack([distance * np.cos(bearing), distance * np.sin(bearing)], axis=-1)
+    points = hits_of(scan.bearings_rad, scan.ranges_m)
     return points if scanner.is_at_axle else to_world(points, scanner.pose_robot)

@@ -180,9 +180,10 @@ class FreeSpace:
     def _reserve(self, centre_world: Float[np.ndarray, "2"], reach_m: float) -> None:
         """Grow the grid, with room to spare, until it holds everything within reach."""
         reach = math.ceil(reach_m / self.config.cell_m) + 1
-        if not np.all(np.abs(centre_world) < _FARTHEST_M):
+        x_m, y_m = centre_world.tolist()
+        if not (abs(x_m) < _FARTHEST_M and abs(y_m) < _FARTHEST_M):
             raise self._too_large(centre_world)
-        x, y = (math.floor(metres / self.config.cell_m) for metres in centre_world.tolist())
+        x, y = math.floor(x_m / self.config.cell_m), math.floor(y_m / self.config.cell_m)
         (column, row), (rows, columns) = self._first.tolist(), self.shape
         if column + reach <= x < column + columns - reach and row + reach <= y < row + rows - reach:
             return

@@ -10,11 +10,13 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from chainslam.slam.estimation.mounting import odometry_of_scanner
 from chainslam.slam.geometry.poses import to_robot, to_world
 from chainslam.slam.robot import Odometry, Scan, ScannerSpec
+
+from .return_kernels import lengths_of_runs, must_meet
 
 RUN = 3
 """Shorter runs without a return are never taken for free floor (`Scan.passed_m`)."""
@@ -28,10 +30,11 @@ NO_MOTION = Odometry(np.zeros(3), np.zeros((3, 3)))
 
 @dataclass(frozen=True)
 class _Seen:
-    """One scan, and the runs in it that may have been lost: those where the scan before it shows a surface."""
+    """One scan, and the lengths of the runs in it that may have been lost: those where one before shows a surface."""
 
     scan: Scan
-    runs: list[Int[np.ndarray, " _"]]
+    points: Float[np.ndarray, "k 2"]
+    runs: Int[np.ndarray, " b"]
 
 
 class LostReturns:
@@ -50,65 +53,39 @@ class LostReturns:
 
     def believed(self, scan: Scan) -> Scan:
         """Return a scan with NaN in place of the runs of +inf that may have been lost; itself where there are none."""
-        runs = _runs_of(np.isposinf(scan.ranges_m), scan.is_full_turn)
-        runs = [run for run in runs if len(run) >= RUN]
+        none = np.isposinf(scan.ranges_m)
+        runs = lengths_of_runs(none, none, scan.is_full_turn)
+        runs[runs < RUN] = 0
         self._learn(scan, runs)
-        doubtful = [run for run in runs if len(run) <= self.longest]
-        if not doubtful:
-            return scan
-        ranges = scan.ranges_m.copy()
-        ranges[np.concatenate(doubtful)] = np.nan
-        return replace(scan, ranges_m=ranges)
+        doubtful = (runs > 0) & (runs <= self.longest)
+        return replace(scan, ranges_m=np.where(doubtful, np.nan, scan.ranges_m)) if doubtful.any() else scan
 
-    def _learn(self, scan: Scan, runs: list[Int[np.ndarray, " _"]]) -> None:
+    def _learn(self, scan: Scan, runs: Int[np.ndarray, " b"]) -> None:
         """Find the runs that the scan before has lost, and those that this one may have."""
-        before, motion = self._before, self._motion.motion
-        if before is not None and before.runs:
-            due = _meets(before.scan, to_world(_points(scan), motion))
-            self._lost.append(max((len(run) for run in before.runs if due[run].all()), default=0))
-            if np.count_nonzero(self._lost) >= SCANS:
+        before, motion, points = self._before, self._motion.motion, _points(scan)
+        if before is None:
+            runs = np.zeros_like(runs)
+        else:
+            self._lost.append(int(_hiding(before.scan, before.runs, to_world(points, motion)).max()))
+            if self._lost[-1] and sum(map(bool, self._lost)) >= SCANS:
                 self.longest = max(self.longest, *self._lost)
-        elif before is not None:
-            self._lost.append(0)
-        if before is not None and runs:
-            due = _meets(scan, to_robot(_points(before.scan), motion))
-            runs = [run for run in runs if due[run].all()]
-        self._before = _Seen(scan, runs if before is not None else [])
+            runs = _hiding(scan, runs, to_robot(before.points, motion))
+        self._before = _Seen(scan, points, runs)
 
 
 def _points(scan: Scan) -> Float[np.ndarray, "k 2"]:
     """Return where each beam ended within reach of a sure return, scanner's frame, m; NaN for the others."""
-    ranges = np.where(scan.ranges_m < SHARE * scan.range_max_m, scan.ranges_m, np.nan)
-    points = np.stack([ranges * np.cos(scan.bearings_rad), ranges * np.sin(scan.bearings_rad)], axis=-1)
-    return np.vstack([points, points[:1]]) if scan.is_full_turn else points
+    ranges, beams = np.where(scan.ranges_m < SHARE * scan.range_max_m, scan.ranges_m, np.nan), len(scan.ranges_m)
+    points = np.empty((beams + scan.is_full_turn, 2))
+    points[:beams, 0], points[:beams, 1] = ranges * np.cos(scan.bearings_rad), ranges * np.sin(scan.bearings_rad)
+    points[beams:] = points[:1]
+    return points
 
 
-def _meets(scan: Scan, points: Float[np.ndarray, "k 2"]) -> Bool[np.ndarray, " b"]:
-    """Return which beams, and their neighbours, must meet a surface of points in their order, in the scan's frame."""
-    first, last = points[:-1], points[1:]
-    bearing = np.arctan2(first[:, 1], first[:, 0])
-    turn = np.arctan2(first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0], np.sum(first * last, axis=1))
-    far_m = np.maximum(np.hypot(*first.T), np.hypot(*last.T))
-    # Unknown points compare as False; a surface seen from behind has its beams in the other order.
-    held = (np.hypot(*(last - first).T) < APART_M) & (turn > 0.0) & (far_m < SHARE * scan.range_max_m)
-    beams = len(scan.ranges_m)
-    begin = (bearing[held] - scan.bearings_rad[0]) % (2.0 * np.pi) / scan.step_rad
-    low, high = np.ceil(begin).astype(int), np.floor(begin + turn[held] / scan.step_rad).astype(int) + 1
-    turns = np.zeros(2 * max(beams, int(np.ceil(2.0 * np.pi / scan.step_rad))) + 2)
-    np.add.at(turns, low, 1.0)
-    np.add.at(turns, np.maximum(high, low), -1.0)
-    met = np.cumsum(turns) > 0.5
-    meets = met[:beams].copy()
-    if scan.is_full_turn:
-        meets |= met[beams : 2 * beams]
-    beside = [np.roll(meets, k) for k in range(-MARGIN, MARGIN + 1)]
-    return np.all(beside, axis=0)
-
-
-def _runs_of(flags: Bool[np.ndarray, " k"], is_full_turn: bool) -> list[Int[np.ndarray, " _"]]:
-    """Return the rows of each run of flags; over a full turn the last row is followed by the first."""
-    if flags.all():
-        return [np.arange(len(flags))]
-    first = int(np.argmin(flags)) if is_full_turn else 0
-    rows = np.roll(np.arange(len(flags)), -first)
-    return [run for run in np.split(rows, np.flatnonzero(np.diff(flags[rows])) + 1) if flags[run[0]]]
+def _hiding(scan: Scan, runs: Int[np.ndarray, " b"], points: Float[np.ndarray, "k 2"]) -> Int[np.ndarray, " b"]:
+    """Return the lengths of those runs of a scan whose beams must all meet a surface of points in its frame."""
+    if not runs.any():
+        return runs
+    first_rad, reach_m, beams = scan.bearings_rad[0], SHARE * scan.range_max_m, len(runs)
+    due = must_meet(points, beams, first_rad, scan.step_rad, scan.is_full_turn, reach_m, APART_M, MARGIN)
+    return lengths_of_runs(runs > 0, due, scan.is_full_turn)

@@ -63,6 +63,8 @@ def followed_wall(walls: StochasticMap, reach_m: float = 1.0, rather: Collection
     along, offset = ends[:, 1] - ends[:, 0], walls.belief.pose_world[:2] - ends[:, 0]
     is_behind = along[:, 0] * offset[:, 1] < along[:, 1] * offset[:, 0]
     distance = np.where(is_behind, np.inf, walls.distances_m[rows])
-    tied = np.flatnonzero(np.isclose(distance, distance.min()))
-    best = int(tied[np.lexsort((distance[tied], ~np.isin(walls.ids[rows[tied]], list(rather))))[0]])
+    best = int(distance.argmin())
+    if len(rather):
+        tied = np.flatnonzero(np.isclose(distance, distance[best])).tolist()
+        best = min((k for k in tied if walls.ids[rows[k]] in rather), key=distance.__getitem__, default=best)
     return int(walls.ids[rows[best]]) if distance[best] <= reach_m else None

@@ -148,7 +148,7 @@ EXPLORATION = (
          ("explore.goals.explorer_config", "first_turns: Number = 4", "first_turns: Number = 0")),
     _off("returns of five scans", "the robot keeps clear of what five scans hit, at the mean of their distances",
          ("explore.floor.accumulated_returns",
-          "mean[near] = (rho[near] + same @ before) / (1.0 + np.count_nonzero(same, axis=1))", "pass"),
+          "points_robot[near] *= (mean / np.maximum(rho, 1e-9))[:, None]", "pass"),
          ("explore.floor.accumulated_returns", "recent_robot[~same.any(axis=0)]", "recent_robot[:0]")),
     _off("careful steps", "a step onto floor that was not seen yet is short",
          (DRIVING, "if abs(command.forward_m) > config.careful_m:", "if False:")),

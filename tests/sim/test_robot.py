@@ -3,6 +3,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from chainslam.sim.kernels import clear_places
 from chainslam.sim.robot import RobotConfig, SimulatedRobot
 from chainslam.slam.geometry.lines import distance_to_segments
 from chainslam.slam.robot import MotionCommand, Robot, ScannerSpec, WheelSpec
@@ -158,6 +159,21 @@ def test_a_body_touches_what_is_in_its_way_from_anywhere():
             assert told.touched == (clear < radius)
             touched += told.touched
     assert 50 < touched < 140
+
+
+def test_places_are_clear_up_to_the_first_that_is_too_near_to_a_face_or_a_person():
+    rng, found = np.random.default_rng(5), []
+    for k in range(200):
+        places, faces, people = (
+            rng.uniform(-3, 3, (8, 2)),
+            rng.uniform(-3, 3, (k % 4, 2, 2)),
+            rng.uniform(-3, 3, (k % 3, 2)),
+        )
+        to_people = np.hypot(*np.moveaxis(places[:, None] - people, -1, 0)).min(axis=1, initial=np.inf)
+        near = (distance_to_segments(places, faces).min(axis=1, initial=np.inf) < 0.4) | (to_people < 0.4 + 0.3)
+        found.append(clear_places(places, faces, 0.4, people, 0.3))
+        assert found[-1] == (np.argmax(near) if near.any() else 8)
+    assert set(found) == set(range(9))
 
 
 def test_a_scanner_off_the_axle_sees_from_where_it_sits():

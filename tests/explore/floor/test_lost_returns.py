@@ -7,13 +7,14 @@ import pytest
 import shapely
 
 from chainslam.experiments.scenario import load_world
-from chainslam.explore.floor.lost_returns import RUN, SCANS, LostReturns, _runs_of
+from chainslam.explore.floor.lost_returns import RUN, SCANS, LostReturns
 from chainslam.sim.faults import FaultsConfig
 from chainslam.sim.lidar import LidarConfig
 from chainslam.sim.people import PeopleConfig
 from chainslam.sim.robot import RobotConfig, SimulatedRobot
 from chainslam.sim.worlds import World
 from chainslam.slam.robot import MotionCommand, ScannerSpec
+from tests.explore.floor.test_return_kernels import runs_of
 
 ROOMS = load_world("rooms")
 AHEAD = ScannerSpec(0.1, -0.05, 0.5 * np.pi)
@@ -67,7 +68,7 @@ def test_runs_that_are_lost_are_no_free_floor_once_it_is_known(clump):
 
 def test_longer_runs_are_free_floor_still():
     _, scans = drive(FaultsConfig(dropout=0.05, clump=4))
-    kept = [run for _, told in scans[30:] for run in _runs_of(np.isposinf(told.ranges_m), True) if len(run) >= RUN]
+    kept = [run for _, told in scans[30:] for run in runs_of(np.isposinf(told.ranges_m), True) if len(run) >= RUN]
     assert kept
     assert min(map(len, kept)) > RUN
     assert sum(map(len, kept)) > 500
@@ -84,11 +85,3 @@ def test_so_many_scans_must_show_a_lost_run():
         lost.believed(replace(scan, ranges_m=ranges))
         lost.move(robot.drive(MotionCommand(0.02, 0.1)))
         assert lost.longest == (6 if k >= 2 * SCANS else 0)
-
-
-def test_runs_go_on_over_the_seam_of_a_full_turn():
-    flags = np.array([True, True, False, True, False, False, True])
-    assert [run.tolist() for run in _runs_of(flags, True)] == [[3], [6, 0, 1]]
-    assert [run.tolist() for run in _runs_of(flags, False)] == [[0, 1], [3], [6]]
-    assert [run.tolist() for run in _runs_of(np.ones(3, dtype=bool), True)] == [[0, 1, 2]]
-    assert _runs_of(np.zeros(3, dtype=bool), True) == []

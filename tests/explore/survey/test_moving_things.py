@@ -7,7 +7,8 @@ import pytest
 import shapely
 
 from chainslam.explore.floor.free_space import FreeSpace
-from chainslam.explore.survey.moving_things import _is_amid_free_floor, moving_returns
+from chainslam.explore.floor.return_kernels import amid_free_floor
+from chainslam.explore.survey.moving_things import moving_returns
 from chainslam.sim.lidar import LidarConfig, RangeFinder, noisy
 from chainslam.sim.people import hidden_by
 from chainslam.slam.geometry.poses import to_world
@@ -96,9 +97,6 @@ class Grid:
     def cells(self, points_world):
         return np.floor(points_world[:, ::-1] / 0.05).astype(int)
 
-    def inside(self, cells):
-        return np.all((cells >= 0) & (cells < self.evidence.shape), axis=1)
-
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_return_counts_in_a_free_cell_with_no_occupied_one_beside_it(seed):
@@ -111,7 +109,7 @@ def test_a_return_counts_in_a_free_cell_with_no_occupied_one_beside_it(seed):
                   if 0 <= r < 40 and 0 <= c < 60]  # fmt: skip
         is_inside = 0 <= row < 40 and 0 <= column < 60
         expected.append(is_inside and grid.evidence[row, column] < 0 and max(beside) <= 0)
-    found = _is_amid_free_floor(grid, points)
+    found = amid_free_floor(grid.evidence, grid.cells(points))
     assert found.tolist() == expected
     assert 50 < found.sum() < 450
 
