@@ -44,9 +44,9 @@ def rows_of(known: Int[np.ndarray, " n"], ids: Sequence[int] | Int[np.ndarray, "
         if len(wanted):
             raise KeyError(f"expected ids of lines in the map, found {wanted.tolist()} in an empty map")
         return wanted
-    rows = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
-    if np.any(known[rows] != wanted):
-        raise KeyError(f"expected ids of lines in the map, found {wanted[known[rows] != wanted].tolist()}")
+    rows = known.searchsorted(wanted)
+    if (unknown := known.take(rows, mode="clip") != wanted).any():
+        raise KeyError(f"expected ids of lines in the map, found {wanted[unknown].tolist()}")
     return rows
 
 

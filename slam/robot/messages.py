@@ -117,7 +117,7 @@ class Scan:
         around = np.concatenate([[last], self.ranges_m, [first]])
         return around[:-2], around[2:]
 
-    @property
+    @cached_property
     def sigmas_m(self) -> Float[np.ndarray, " k"]:
         """Standard deviation of each beam's range error at its measured range, m."""
         sigmas = np.broadcast_to(np.asarray(self.sigma_m, dtype=np.float64), self.ranges_m.shape)

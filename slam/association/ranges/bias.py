@@ -24,7 +24,7 @@ class RangeBias:
 
     def __init__(self, config: RangesConfig = DEFAULTS) -> None:
         self._config = config
-        self._sums: dict[int, Float[np.ndarray, 2]] = {}
+        self._sums: dict[int, tuple[float, float]] = {}
         """Of each wall, by its id: information and score."""
         self._prior = np.array([config.bias_m**-2, 0.0])
         self._total = self._prior.copy()
@@ -79,8 +79,9 @@ class RangeBias:
 
     def learn(self, sums: Float[np.ndarray, "s 2"], walls: Int[np.ndarray, " s"]) -> None:
         """Take in the sums of a scan's segments, each of the wall of this id."""
-        for wall, each in zip(walls.tolist(), sums, strict=True):
-            if each[0] > 0.0:
-                self._sums[wall] = self._sums.get(wall, 0.0) + each
+        for wall, (information, score) in zip(walls.tolist(), sums.tolist(), strict=True):
+            if information > 0.0:
+                before = self._sums.get(wall, (0.0, 0.0))
+                self._sums[wall] = before[0] + information, before[1] + score
         self._total = self._total + sums.sum(axis=0)
         self._scans += 1
