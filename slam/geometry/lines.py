@@ -5,7 +5,7 @@ direction of travel with the free side on the left is t = J n.
 """
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from .numerics import TINY
 from .poses import wrap
@@ -61,20 +61,3 @@ def distance_to_segments(
     share = np.clip(np.vecdot(offset, along) / squared, 0.0, 1.0)
     gap = offset - share[..., None] * along
     return np.hypot(gap[..., 0], gap[..., 1])
-
-
-def segment_distances(one: Float[np.ndarray, "m 2 2"], other: Float[np.ndarray, "n 2 2"]) -> Float[np.ndarray, "m n"]:
-    """Return the least distance between each segment of the one and each of the other; 0 where they cross."""
-    m, n = len(one), len(other)
-    ends = distance_to_segments(one.reshape(-1, 2), other).reshape(m, 2, n).min(axis=1)
-    theirs = distance_to_segments(other.reshape(-1, 2), one).reshape(n, 2, m).min(axis=1)
-    cross = _parts(one, other) & _parts(other, one).T
-    return np.where(cross, 0.0, np.minimum(ends, theirs.T))
-
-
-def _parts(one: Float[np.ndarray, "m 2 2"], other: Float[np.ndarray, "n 2 2"]) -> Bool[np.ndarray, "m n"]:
-    """Return whether the ends of each of the other lie on different sides of the line through each of the one."""
-    along = one[:, 1] - one[:, 0]
-    offset = other[None] - one[:, None, :1]
-    side = along[:, None, None, 0] * offset[..., 1] - along[:, None, None, 1] * offset[..., 0]
-    return np.asarray(side[..., 0] * side[..., 1] < 0.0)

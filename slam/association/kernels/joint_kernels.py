@@ -80,8 +80,14 @@ def seen_halfway(
     line: Int[np.ndarray, " m"],
     lines: Float[np.ndarray, "m 2"],
     lines_cov: Float[np.ndarray, "m 2 2"],
-) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2 3"], Float[np.ndarray, "t k"], Float[np.ndarray, "k k"]]:
-    """Return e, H_pose, P H' and S of seen lines, linearised halfway to where they put the pose."""
+) -> tuple[
+    Float[np.ndarray, " k"],
+    Float[np.ndarray, "k 3"],
+    Float[np.ndarray, "t k"],
+    Float[np.ndarray, "k k"],
+    Float[np.ndarray, "k k"],
+]:
+    """Return e, H_pose, P H', S and its W of seen lines, linearised halfway to where they put the pose."""
     means = mean[3:].reshape((-1, 2))[line]
     pose = mean[:3]
     e, H_pose, H_line, R = innovation_rows(pose, anchors[line], means, lines, lines_cov, pose[:2], means[:, 0].copy())
@@ -93,4 +99,4 @@ def seen_halfway(
             turn[k] += (gain[3 + 2 * line[k], i] - gain[2, i]) * e[i // 2, i % 2]
     turn_halfway(e, H_pose, H_line, lines, lines_cov, turn)
     PHt, S = taken_together(cov, line, H_pose, H_line, R)
-    return e, H_pose, PHt, S
+    return e.ravel(), H_pose.reshape((-1, 3)), PHt, S, whitening(S)
