@@ -225,8 +225,9 @@ class Mapper:
         if may_have_moved and self.config.recovery is not None:
             pose_cov = pose_cov + unstated_cov(self.config.recovery)
         if self._method.looks_near:
-            near = near[near_segments(segments, walls.ends_world[near], belief.pose_world, pose_cov, config)]
-        known = KnownWalls(walls.ids[near], walls.extents[near], None if walls.whole is None else walls.whole[near])
+            near = near[near_segments(segments, walls.ends_world.take(near, 0), belief.pose_world, pose_cov, config)]
+        whole = None if walls.whole is None else walls.whole.take(near)
+        known = KnownWalls(walls.ids.take(near), walls.extents.take(near, 0), whole)
         return View(segments, known, self.backend.belief.joint(known.ids), self._method, config)
 
     def _observed(self, matches: Matches, segments: Segments) -> Observations:

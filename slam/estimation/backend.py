@@ -83,8 +83,8 @@ class Belief:
     @cached_property
     def lines_world(self) -> Float[np.ndarray, "n 2"]:
         """The lines in Hessian form (alpha rad, r m), world frame; read-only."""
-        r = self.means[:, 1] + np.vecdot(normals(self.means[:, 0]), self.anchors)
-        lines = np.stack([self.means[:, 0], r], axis=-1)
+        lines = self.means.copy()
+        lines[:, 1] += np.vecdot(normals(lines[:, 0]), self.anchors)
         lines.flags.writeable = False
         return lines
 

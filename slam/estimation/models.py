@@ -4,7 +4,7 @@ A line is (alpha, d) about a constant anchor c, r = d + n(alpha)·c in the world
 90-degree rotation and n' = J n. Jacobians are taken at the estimate, or where the caller says (`position`, `alpha`).
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -125,7 +125,7 @@ class Linear:
 
     def before(self, step: Float[np.ndarray, " p"]) -> "Linear":
         """Return the measurement as one of the errors before a step of the first p parts of the state: e + H step."""
-        return replace(self, e=self.e + self.H[:, : len(step)] @ step)
+        return Linear(self.rows, self.H, self.e + self.H[:, : len(step)] @ step, self.R, self.place)
 
 
 def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:

@@ -29,15 +29,15 @@ class RangeBias:
         self._prior = np.array([config.bias_m**-2, 0.0])
         self._total = self._prior.copy()
         self._scans = 0
+        self.sigma_m = self._sigma_m()
+        """Its standard deviation m: by the noise of the beams, or by how walls differ, whichever is larger."""
 
     @property
     def mean_m(self) -> float:
         """The likeliest bias m."""
         return float(self._total[1] / self._total[0])
 
-    @property
-    def sigma_m(self) -> float:
-        """Its standard deviation m: by the noise of the beams, or by how walls differ, whichever is larger."""
+    def _sigma_m(self) -> float:
         information, mean = float(self._total[0]), self.mean_m
         sums = np.array(list(self._sums.values())).reshape(-1, 2)
         spread = float(np.sqrt(np.sum((sums[:, 1] - mean * sums[:, 0]) ** 2))) / information
@@ -85,3 +85,4 @@ class RangeBias:
                 self._sums[wall] = before[0] + information, before[1] + score
         self._total = self._total + sums.sum(axis=0)
         self._scans += 1
+        self.sigma_m = self._sigma_m()
