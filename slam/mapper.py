@@ -13,7 +13,7 @@ from .association.methods import METHODS, Matcher
 from .association.motion_noise import MotionInnovation, MotionNoise
 from .association.ranges.heard import Heard, Ranges
 from .association.recovery import Localisation, unstated_cov, unstated_motion
-from .association.view import View, may_be_off_m, near_segments
+from .association.view import View, may_be_off, near_segments
 from .config import MapperConfig
 from .estimation.backend import Backend, Belief, ContradictionError, Observations
 from .estimation.mounting import belief_of_body, odometry_of_scanner
@@ -36,6 +36,8 @@ class Localised:
     view: View
     first: Observations
     """The matches that localise the robot."""
+    second: Observations
+    """The matches from the pose that those lead to, as observations."""
     nis: Nis
     innovation: MotionInnovation | None
     """What they say of the last motion's noise."""
@@ -150,7 +152,7 @@ class Mapper:
         matches = found.matches
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
         try:
-            self.backend.update(found.first, self._observed(matches, segments))
+            self.backend.update(found.first, found.second)
             _ = self.backend.belief  # A graph solves for the observations when it is asked.
         except ContradictionError:
             self._left_out += 1
@@ -172,9 +174,11 @@ class Mapper:
         clear = view.match_clear()
         # 3. Localise the robot with matched features (here as a pure function, to match again).
         first = self._observed(clear, segments)
+        seen = view.seen(first)
         # 4. Match features with their re-prediction from the new robot pose.
-        matches = view.match_again(clear, view.localised(first))
-        return Localised(view, first, *view.surprise(first, self._odometry), matches)
+        matches = view.match_again(clear, seen)
+        second = first if np.array_equal(matches.pairs, clear.pairs) else self._observed(matches, segments)
+        return Localised(view, first, second, *view.surprise(seen, self._odometry), matches)
 
     def _recovery(self, scan: Scan, found: Localised, walls: StochasticMap) -> Odometry | None:
         """Return the motion that the odometry did not report and this scan shows; notes whether the robot is lost."""
@@ -217,22 +221,21 @@ class Mapper:
     def _view(self, scan: Scan, segments: Segments, walls: StochasticMap, may_have_moved: bool = False) -> View:
         """Return the scan beside the walls that its segments may be of, also after a motion that nobody reported."""
         belief, config, pose_cov = walls.belief, self.config.matching, walls.belief.pose_cov
-        near = walls.distances_m < scan.range_max_m + may_be_off_m(pose_cov, config, np.zeros(1))
+        near = np.flatnonzero(walls.distances_m < scan.range_max_m + may_be_off(pose_cov, config)[0])
         if may_have_moved and self.config.recovery is not None:
             pose_cov = pose_cov + unstated_cov(self.config.recovery)
         if self._method.looks_near:
-            in_range = np.flatnonzero(near)
-            ends = walls.ends_world[in_range]
-            near = in_range[near_segments(segments, ends, belief.pose_world, pose_cov, config)]
-        known = KnownWalls(walls.ids[near], walls.extents[near], None if walls.whole is None else walls.whole[near])
+            near = near[near_segments(segments, walls.ends_world.take(near, 0), belief.pose_world, pose_cov, config)]
+        whole = None if walls.whole is None else walls.whole.take(near)
+        known = KnownWalls(walls.ids.take(near), walls.extents.take(near, 0), whole)
         return View(segments, known, self.backend.belief.joint(known.ids), self._method, config)
 
     def _observed(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches as observations that move the estimate."""
-        observed = matches.observations(segments)
         seen = segments.take(matches.pairs[:, 0])
-        cov = as_told(observed.cov, seen, self.config.walls.reliability)
-        return replace(observed, cov=cov + self._keeper.landmarks.lack_of_fit(seen, matches.pairs[:, 1]))
+        cov = as_told(seen.cov, seen, self.config.walls.reliability)
+        cov = cov + self._keeper.landmarks.lack_of_fit(seen, matches.pairs[:, 1])
+        return Observations(matches.pairs[:, 1], seen.lines, cov)
 
     def _pieces(self, scan: Scan) -> Segments:
         """Return the straight pieces of the scan."""

@@ -5,7 +5,7 @@ beside a door stay two), and the side from which each was seen (so that two face
 """
 
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -52,6 +52,24 @@ class MatchingConfig:
     def doubt(self) -> float:
         """Level up to which a wall is not ruled out: a segment of it is not made a wall, nor fused beyond the gate."""
         return 1.0 - self.shared.chance
+
+    @cached_property
+    def limits(self) -> Limits:
+        """The numbers as the loops read them."""
+        shared = self.shared
+        return Limits(
+            gate_level(self.gate, 2),
+            gate_level(self.doubt, 2),
+            gate_level(self.one_wall, 2),
+            float(np.cos(self.angle_rad)),
+            float(self.overlap_m),
+            float(self.beside_rad),
+            float(self.density),
+            float(shared.beside_m),
+            float(shared.face_m),
+            float(shared.short_m),
+            float(shared.far_m),
+        )
 
 
 @dataclass(frozen=True)
@@ -109,12 +127,12 @@ def match(
     """Match segments to the lines of `joint`, which are those of `walls` in the same order.
 
     With `clear_only`, keep only segments with one candidate that stands out, and of these only a jointly
-    compatible set: what is safe enough to relocate the robot by.
+    compatible set: what is safe enough to relocate the robot by. Why others were refused is not told then.
     """
     count, ids = len(segments), walls.ids
     if not len(ids) or not count:
         return replace(NO_MATCHES, unmatched=np.arange(count))
-    limits, together = limits_of(config), pair_levels(config.doubt, count)
+    limits, together = config.limits, pair_levels(config.doubt, count)
     seen = Seen(segments.lines, segments.cov, segments.ends, segments.is_tentative)
     whole = np.zeros(len(ids), dtype=bool) if walls.whole is None else walls.whole
     known = Known(joint.mean, np.ascontiguousarray(joint.cov), joint.anchors, walls.extents, whole)
@@ -122,32 +140,13 @@ def match(
     is_matched = np.zeros(count, dtype=bool)
     is_matched[pairs[:, 0]] = True
     pairs[:, 1] = ids[pairs[:, 1]]
+    rest = pairs, distances, (~is_matched).nonzero()[0], (~is_matched & doubtful).nonzero()[0]
+    if clear_only:
+        return Matches(*rest, {})
     return Matches(
-        pairs,
-        distances,
-        np.flatnonzero(~is_matched),
-        np.flatnonzero(~is_matched & doubtful),
+        *rest,
         {int(found.segment[pair]): why(found, pair, ids, limits) for pair in refused(found, is_matched).tolist()},
         along(found, ~is_matched & ~segments.is_tentative, ids, limits, config.shared.straight_rad),
-    )
-
-
-@lru_cache
-def limits_of(config: MatchingConfig) -> Limits:
-    """Return the numbers as the loops read them."""
-    shared = config.shared
-    return Limits(
-        gate_level(config.gate, 2),
-        gate_level(config.doubt, 2),
-        gate_level(config.one_wall, 2),
-        float(np.cos(config.angle_rad)),
-        float(config.overlap_m),
-        float(config.beside_rad),
-        float(config.density),
-        float(shared.beside_m),
-        float(shared.face_m),
-        float(shared.short_m),
-        float(shared.far_m),
     )
 
 
@@ -160,7 +159,8 @@ def along(
 ) -> Int[np.ndarray, " f"]:
     """Return the ids of walls along which some of these segments lie: they pass the gate, overlap, and hardly turn."""
     lies = (found.d2 <= limits.level) & (found.gap <= -limits.overlap_m) & (np.abs(found.e[:, 0]) < straight_rad)
-    return np.unique(ids[found.line[lies & among[found.segment]]])
+    lines = found.line[lies & among[found.segment]]
+    return np.unique(ids[lines]) if len(lines) else lines
 
 
 def why(found: Candidates, pair: int, ids: Int[np.ndarray, " n"], limits: Limits) -> str:

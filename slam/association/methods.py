@@ -4,12 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-import numpy as np
-from jaxtyping import Int
-
-from ..estimation.backend import Joint, Observations
+from ..estimation.backend import Joint
 from ..extraction.segments import Segments
-from .joint_compatibility import relocate
+from .joint_compatibility import JointObservations, relocate
 from .matching import KnownWalls, Matches, MatchingConfig, MatchingMethod, match
 from .paper_matching import match_alone, relocate_robot
 
@@ -30,7 +27,7 @@ class Method:
     """How steps 2, 3 and 4 of the paper are taken."""
 
     matcher: Matcher
-    relocate: Callable[[Joint, Int[np.ndarray, " n"], Observations], Joint]
+    relocate: Callable[[Joint, JointObservations], Joint]
     """What is known once the robot is localised, to match again."""
     clear_stay: bool
     """Whether the first matches stand, and only the other segments are matched again."""

@@ -9,14 +9,13 @@ a. So a scan leaves three pairs (a, w), and a window of them tells the likeliest
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from ..estimation.backend import Joint, Observations
 from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.compiled import plain
 from ..geometry.quantities import Count
 from ..robot import Odometry
-from .joint_compatibility import NO_NIS, Nis, seen_halfway
+from .joint_compatibility import NO_NIS, JointObservations, Nis
 from .kernels import motion_kernels
 
 
@@ -43,17 +42,14 @@ class MotionInnovation:
     """Of mean zero and variance a if the noise is as stated."""
 
 
-def surprise(
-    joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations, motion_root: Float[np.ndarray, "3 3"]
-) -> tuple[Nis, MotionInnovation | None]:
+def surprise(seen: JointObservations, motion_root: Float[np.ndarray, "3 3"]) -> tuple[Nis, MotionInnovation | None]:
     """Return the NIS of observations of some lines of the joint Gaussian, and what they say of the last motion.
 
     `motion_root` is G, world frame, with G G' the covariance that the motion added to the pose.
     """
-    if not len(observed.ids):
+    if not len(seen.e):
         return NO_NIS, None
-    seen = seen_halfway(joint, ids, observed)
-    squared, a, w = motion_kernels.surprise(seen.e, seen.H_pose.reshape(-1, 3), seen.S, motion_root)
+    squared, a, w = motion_kernels.surprise(seen.e, seen.H_pose, seen.W, motion_root)
     return Nis(squared, len(seen.e)), MotionInnovation(a, w)
 
 

@@ -10,13 +10,14 @@ takes the best. No segment is in doubt: one that nothing passes is a new wall.
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ..estimation.backend import POSE, Joint, Observations
+from ..estimation.backend import POSE, Joint
 from ..estimation.gates import gate_level
 from ..estimation.models import innovations
 from ..extraction.segments import Segments
-from ..geometry.lines import directions, normals, segment_distances
+from ..geometry.lines import directions, normals
 from ..geometry.poses import to_world
-from .joint_compatibility import relocate
+from ..geometry.segment_kernels import segment_distances
+from .joint_compatibility import JointObservations, relocate
 from .kernels.joint_kernels import pair_distances
 from .matching import KnownWalls, Matches, MatchingConfig
 
@@ -54,12 +55,12 @@ def match_alone(
     )
 
 
-def relocate_robot(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -> Joint:
+def relocate_robot(joint: Joint, seen: JointObservations) -> Joint:
     """Move the robot alone by observations of some of the lines (paper, step 3): the map stays for steps 4 and 5.
 
     What the robot's error then shares with the lines is that of the optimal gain, whatever the lines do.
     """
-    moved = relocate(joint, ids, observed)
+    moved = relocate(joint, seen)
     mean, cov = moved.mean.copy(), moved.cov.copy()
     mean[POSE:], cov[POSE:, POSE:] = joint.mean[POSE:], joint.cov[POSE:, POSE:]
     return Joint(mean, cov, joint.anchors)

@@ -125,12 +125,12 @@ def _nearby(view: View, matches: Matches, config: RecoveryConfig) -> Float[np.nd
     """Return the place nearby from which the walls explain far more of a scan than `matches` do, if there is one."""
     wide = replace(view, joint=_widened(view.joint, unstated_cov(config)))
     clear = wide.match_clear()
-    relocated = wide.localised(clear.observations(view.segments))
-    again = wide.match_again(clear, relocated)
+    seen = wide.seen(clear.observations(view.segments))
+    again = wide.match_again(clear, seen)
     sure = ~view.segments.is_tentative
     more = _explained(sure, again) - _explained(sure, matches)
     enough = more >= config.least_segments and _explains(view.segments, again, config)
-    return relocated.mean[:3] if enough else None
+    return wide.localised(seen).mean[:3] if enough else None
 
 
 def is_contradicted(scan: Scan, walls: StochasticMap, config: RecoveryConfig) -> bool:

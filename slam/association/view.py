@@ -1,5 +1,6 @@
 """One scan beside the walls that it can show: matched, used to localise, and matched again (paper, section 2.2)."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +9,10 @@ from jaxtyping import Bool, Float
 from ..estimation.backend import Joint, Observations
 from ..estimation.gates import gate_level
 from ..extraction.segments import Segments
-from ..geometry.lines import segment_distances
-from ..geometry.poses import to_world
+from ..geometry.compiled import plain
 from ..robot import Odometry
-from .joint_compatibility import Nis
+from .joint_compatibility import JointObservations, Nis, seen_halfway
+from .kernels import near_kernels
 from .matching import KnownWalls, Matches, MatchingConfig
 from .methods import Method
 from .motion_noise import MotionInnovation, motion_root, surprise
@@ -36,20 +37,26 @@ class View:
         """Return all matches, from the pose before the scan."""
         return self.method.matcher(self.segments, self.walls, self.joint, self.config)
 
-    def localised(self, first: Observations) -> Joint:
+    def seen(self, first: Observations) -> JointObservations:
+        """Return observations of some of the walls beside what was believed of them before."""
+        return seen_halfway(self.joint, self.walls.ids, first)
+
+    def localised(self, seen: JointObservations) -> Joint:
         """Return pose and walls as they are known once some walls were observed."""
-        return self.method.relocate(self.joint, self.walls.ids, first)
+        return self.method.relocate(self.joint, seen)
 
-    def surprise(self, first: Observations, odometry: Odometry) -> tuple[Nis, MotionInnovation | None]:
+    def surprise(self, seen: JointObservations, odometry: Odometry) -> tuple[Nis, MotionInnovation | None]:
         """Return how far observations lie from where the belief puts them after `odometry`, and what they say of it."""
-        return surprise(self.joint, self.walls.ids, first, motion_root(odometry, float(self.joint.mean[2])))
+        return surprise(seen, motion_root(odometry, float(self.joint.mean[2])))
 
-    def match_again(self, clear: Matches, relocated: Joint) -> Matches:
+    def match_again(self, clear: Matches, seen: JointObservations) -> Matches:
         """Return the matches from the new pose: of the remaining segments, beside the clear ones, or of all."""
         if not self.method.clear_stay:
-            return self.method.matcher(self.segments, self.walls, relocated, self.config)
+            return self.method.matcher(self.segments, self.walls, self.localised(seen), self.config)
         rest = clear.unmatched
-        again = self.method.matcher(self.segments.take(rest), self.walls, relocated, self.config)
+        if not len(rest):
+            return clear
+        again = self.method.matcher(self.segments.take(rest), self.walls, self.localised(seen), self.config)
         more = again.pairs.copy()
         more[:, 0] = rest[more[:, 0]]
         return Matches(
@@ -62,15 +69,14 @@ class View:
         )
 
 
-def may_be_off_m(
-    pose_cov: Float[np.ndarray, "3 3"], config: MatchingConfig, away_m: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, " n"]:
-    """Return how far what is seen so far away may lie from where it is believed, m.
+def may_be_off(pose_cov: Float[np.ndarray, "3 3"], config: MatchingConfig) -> tuple[float, float]:
+    """Return how far what is seen may lie from where it is believed, m, and by how much it may be turned, rad.
 
     By what the pose may be off up to the level of doubt, and far enough for walls that are known less well.
     """
-    sigmas_m = np.sqrt(np.trace(pose_cov[:2, :2])) + away_m * np.sqrt(pose_cov[2, 2])
-    return config.shared.far_m + np.sqrt(gate_level(config.doubt, 2)) * sigmas_m
+    sigmas = math.sqrt(gate_level(config.doubt, 2))
+    off_m = config.shared.far_m + sigmas * math.sqrt(pose_cov[0, 0] + pose_cov[1, 1])
+    return off_m, sigmas * math.sqrt(pose_cov[2, 2])
 
 
 def near_segments(
@@ -84,8 +90,4 @@ def near_segments(
 
     Of the others no more is asked: a joint covariance with hundreds of walls takes longer than all matching with it.
     """
-    if not len(segments) or not len(ends_world):
-        return np.zeros(len(ends_world), dtype=bool)
-    away_m = np.hypot(segments.ends[..., 0], segments.ends[..., 1]).max(axis=1)
-    apart = segment_distances(to_world(segments.ends, pose_world), ends_world)
-    return np.asarray(np.any(apart < may_be_off_m(pose_cov, config, away_m)[:, None], axis=0))
+    return near_kernels.near_segments(segments.ends, ends_world, plain(pose_world), *may_be_off(pose_cov, config))

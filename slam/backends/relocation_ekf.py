@@ -6,6 +6,7 @@ from jaxtyping import Float
 from ..estimation.backend import POSE, Observations
 from ..estimation.models import Linear, innovations, stack
 from ..geometry.poses import wrap
+from .kalman import kernels
 from .kalman.dense_map import DenseMap, cholesky
 from .kalman.ekf import Ekf
 
@@ -30,7 +31,7 @@ class RelocationMap(DenseMap):
         """
         PHt1, S1 = self._predicted(first)
         PHt2, S2 = self._predicted(second)
-        across, pose_cov = self._across(np.arange(POSE)), self.pose_cov
+        across, pose_cov = kernels.across(self._P, np.arange(POSE)), self.pose_cov
         S1, both = S1 + first.R, first.H @ PHt2[self._columns(first.rows)] + shared
         A = np.linalg.solve(S1, PHt1[:POSE].T).T
         pose_cov -= A @ S1 @ A.T

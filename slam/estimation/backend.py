@@ -44,9 +44,9 @@ def rows_of(known: Int[np.ndarray, " n"], ids: Sequence[int] | Int[np.ndarray, "
         if len(wanted):
             raise KeyError(f"expected ids of lines in the map, found {wanted.tolist()} in an empty map")
         return wanted
-    rows = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
-    if np.any(known[rows] != wanted):
-        raise KeyError(f"expected ids of lines in the map, found {wanted[known[rows] != wanted].tolist()}")
+    rows = known.searchsorted(wanted)
+    if (unknown := known.take(rows, mode="clip") != wanted).any():
+        raise KeyError(f"expected ids of lines in the map, found {wanted[unknown].tolist()}")
     return rows
 
 
@@ -83,8 +83,8 @@ class Belief:
     @cached_property
     def lines_world(self) -> Float[np.ndarray, "n 2"]:
         """The lines in Hessian form (alpha rad, r m), world frame; read-only."""
-        r = self.means[:, 1] + np.vecdot(normals(self.means[:, 0]), self.anchors)
-        lines = np.stack([self.means[:, 0], r], axis=-1)
+        lines = self.means.copy()
+        lines[:, 1] += np.vecdot(normals(lines[:, 0]), self.anchors)
         lines.flags.writeable = False
         return lines
 

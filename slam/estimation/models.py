@@ -4,13 +4,13 @@ A line is (alpha, d) about a constant anchor c, r = d + n(alpha)·c in the world
 90-degree rotation and n' = J n. Jacobians are taken at the estimate, or where the caller says (`position`, `alpha`).
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..geometry.lines import directions, normals
-from ..geometry.poses import J, compose, rotation, wrap
+from ..geometry.poses import J, rotation, wrap
 from .kernels import innovation_rows, stacked, turn_halfway
 
 
@@ -37,10 +37,11 @@ def move(
     """Predict the pose after `motion` (robot frame); F is J (p+ - p) with p the estimate, or `position`."""
     R = rotation(pose_world[2])
     F, W = np.eye(3), np.eye(3)
-    moved = compose(pose_world, motion)
-    F[:2, 2] = J @ (R @ motion[:2] if position is None else moved[:2] - position)
+    step = R @ motion[:2]
+    moved = pose_world[:2] + step
+    F[:2, 2] = J @ (step if position is None else moved - position)
     W[:2, :2] = R
-    return Motion(moved, F, W)
+    return Motion(np.array([moved[0], moved[1], wrap(pose_world[2] + motion[2])]), F, W)
 
 
 def lines_robot(
@@ -124,7 +125,7 @@ class Linear:
 
     def before(self, step: Float[np.ndarray, " p"]) -> "Linear":
         """Return the measurement as one of the errors before a step of the first p parts of the state: e + H step."""
-        return replace(self, e=self.e + self.H[:, : len(step)] @ step)
+        return Linear(self.rows, self.H, self.e + self.H[:, : len(step)] @ step, self.R, self.place)
 
 
 def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:

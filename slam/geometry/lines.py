@@ -5,7 +5,7 @@ direction of travel with the free side on the left is t = J n.
 """
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from .numerics import TINY
 from .poses import wrap
@@ -24,7 +24,7 @@ def directions(alpha: Float[np.ndarray, "*n"] | np.floating) -> Float[np.ndarray
 def _vectors(
     x: Float[np.ndarray, "*n"] | np.floating, y: Float[np.ndarray, "*n"] | np.floating
 ) -> Float[np.ndarray, "*n 2"]:
-    vectors = np.empty((*np.shape(x), 2))  # a fifth of what np.stack takes, dozens of times in a step
+    vectors = np.empty((*x.shape, 2))  # a fifth of what np.stack takes, dozens of times in a step
     vectors[..., 0], vectors[..., 1] = x, y
     return vectors
 
@@ -33,7 +33,7 @@ def through(segments: Float[np.ndarray, "n 2 2"]) -> Float[np.ndarray, "n 2"]:
     """Return the lines (alpha, r) through segments that are ordered with the free side on the left."""
     along = segments[:, 1] - segments[:, 0]
     alpha = np.arctan2(-along[:, 0], along[:, 1])
-    return np.stack([alpha, np.vecdot(normals(alpha), segments[:, 0])], axis=-1)
+    return _vectors(alpha, np.vecdot(normals(alpha), segments[:, 0]))
 
 
 def lines_to_world(
@@ -41,7 +41,7 @@ def lines_to_world(
 ) -> Float[np.ndarray, "n 2"]:
     """Return robot-frame lines in the world frame; there r may be negative."""
     alpha = wrap(lines_robot[:, 0] + pose_world[2])
-    return np.stack([alpha, lines_robot[:, 1] + normals(alpha) @ pose_world[:2]], axis=-1)
+    return _vectors(alpha, lines_robot[:, 1] + normals(alpha) @ pose_world[:2])
 
 
 def project(points: Float[np.ndarray, "*n 2"], lines: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
@@ -61,20 +61,3 @@ def distance_to_segments(
     share = np.clip(np.vecdot(offset, along) / squared, 0.0, 1.0)
     gap = offset - share[..., None] * along
     return np.hypot(gap[..., 0], gap[..., 1])
-
-
-def segment_distances(one: Float[np.ndarray, "m 2 2"], other: Float[np.ndarray, "n 2 2"]) -> Float[np.ndarray, "m n"]:
-    """Return the least distance between each segment of the one and each of the other; 0 where they cross."""
-    m, n = len(one), len(other)
-    ends = distance_to_segments(one.reshape(-1, 2), other).reshape(m, 2, n).min(axis=1)
-    theirs = distance_to_segments(other.reshape(-1, 2), one).reshape(n, 2, m).min(axis=1)
-    cross = _parts(one, other) & _parts(other, one).T
-    return np.where(cross, 0.0, np.minimum(ends, theirs.T))
-
-
-def _parts(one: Float[np.ndarray, "m 2 2"], other: Float[np.ndarray, "n 2 2"]) -> Bool[np.ndarray, "m n"]:
-    """Return whether the ends of each of the other lie on different sides of the line through each of the one."""
-    along = one[:, 1] - one[:, 0]
-    offset = other[None] - one[:, None, :1]
-    side = along[:, None, None, 0] * offset[..., 1] - along[:, None, None, 1] * offset[..., 0]
-    return np.asarray(side[..., 0] * side[..., 1] < 0.0)

@@ -1,9 +1,12 @@
 """Loops over points and segments."""
 
+import math
+
 import numpy as np
 from jaxtyping import Bool, Float
 
 from .compiled import compiled
+from .numerics import TINY
 
 
 @compiled
@@ -34,3 +37,30 @@ def lie_beside(
                 beside[p] = True
                 break
     return beside
+
+
+@compiled
+def segment_distances(one: Float[np.ndarray, "m 2 2"], other: Float[np.ndarray, "n 2 2"]) -> Float[np.ndarray, "m n"]:
+    """Return the least distance between each segment of the one and each of the other; 0 where they cross."""
+    found = np.empty((len(one), len(other)))
+    for m in range(len(one)):
+        for n in range(len(other)):
+            found[m, n] = apart(one[m], other[n])
+    return found
+
+
+@compiled
+def apart(one: Float[np.ndarray, "2 2"], other: Float[np.ndarray, "2 2"]) -> float:
+    """Return the least distance between two segments; 0 where they cross."""
+    crosses, least = True, math.inf
+    for a, b in ((one, other), (other, one)):
+        along_x, along_y = b[1, 0] - b[0, 0], b[1, 1] - b[0, 1]
+        sides = 1.0
+        for end in range(2):
+            x, y = a[end, 0] - b[0, 0], a[end, 1] - b[0, 1]
+            share = (x * along_x + y * along_y) / max(along_x * along_x + along_y * along_y, TINY**2)
+            share = min(max(share, 0.0), 1.0)
+            least = min(least, math.hypot(x - share * along_x, y - share * along_y))
+            sides *= along_x * y - along_y * x
+        crosses = crosses and sides < 0.0
+    return 0.0 if crosses else least

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from ..estimation.models import move
 from ..estimation.mounting import odometry_of_scanner
 from ..estimation.shared import SharedConfig, of_shared
-from ..geometry.poses import J, compose, rotation, wrap
+from ..geometry.poses import wrap
 from ..geometry.quantities import Count
 from ..robot import Odometry, RobotSpec, Scan, ScannerSpec, of_robot
 from .robot_faults import APART_M, APART_RAD, Fault, expected, tried_first
@@ -51,13 +52,18 @@ class DiagnosisConfig:
 
 @dataclass
 class _Moved:
-    """What the wheels report of one motion of the body, and the scans before and after it."""
+    """What the wheels report of the motions of the body between two scans, one after the other, and these scans."""
 
-    wheels: Odometry
+    motions: "Sequence[Odometry] | Sequence[_Moved]"
     before: Scan
     after: Scan
     told: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]] | None = None
     """The scanner's by the scans alone, and their information, once it was asked for."""
+
+    @functools.cached_property
+    def wheels(self) -> Odometry:
+        """The motions as one."""
+        return functools.reduce(composed, (each.wheels if isinstance(each, _Moved) else each for each in self.motions))
 
 
 class Diagnosis:
@@ -69,22 +75,23 @@ class Diagnosis:
         self._farther: deque[_Moved] = deque(maxlen=config.window)
         self._together: list[_Moved] = []
         self._rescued: deque[bool] = deque(maxlen=config.within)
-        self._wheels: Odometry | None = AT_REST
+        self._wheels: list[Odometry] | None = [AT_REST]
         self._scan: Scan | None = None
 
     def moved(self, odometry: Odometry) -> None:
         """Take note of what the wheels report; where scans have told a motion, there is nothing to judge."""
         before = self._wheels
-        self._wheels = None if before is None or odometry.wheels is not None else composed(before, odometry)
+        self._wheels = None if before is None or odometry.wheels is not None else [*before, odometry]
 
     def repeats(self, scan: Scan) -> bool:
         """Return whether a scan is the last one again, beam by beam, though the wheels led where it does not fit."""
-        if self._scan is None or self._wheels is None or np.abs(self._wheels.motion).max() <= STILL:
+        if self._scan is None or self._wheels is None or not _are_alike(scan, self._scan):
             return False
-        if not _are_alike(scan, self._scan):
+        moved = _Moved(self._wheels, self._scan, scan)
+        if np.abs(moved.wheels.motion).max() <= STILL:
             return False
-        motion, information = self._told(_Moved(self._wheels, self._scan, scan))
-        off = odometry_of_scanner(self._wheels, self._config.robot.scanner).motion - motion
+        motion, information = self._told(moved)
+        off = odometry_of_scanner(moved.wheels, self._config.robot.scanner).motion - motion
         return float(off @ information @ off) > self._config.shared.outlier_sigmas**2
 
     def see(self, scan: Scan, was_rescued: bool, is_in_doubt: bool) -> str:
@@ -99,9 +106,9 @@ class Diagnosis:
             self._last.append(_Moved(self._wheels, self._scan, scan))
             self._together.append(self._last[-1])
             if len(self._together) == TOGETHER:
-                self._farther.append(_in_one(self._together))
-                self._together.clear()
-        self._wheels, self._scan = AT_REST, scan
+                self._farther.append(_Moved(self._together, self._together[0].before, scan))
+                self._together = []
+        self._wheels, self._scan = [AT_REST], scan
         self._rescued.append(was_rescued)
         if fault := self._fault() if was_rescued or is_in_doubt else None:
             repeats = fault.stands and _are_alike(self._last[-1].before, scan)
@@ -153,21 +160,14 @@ class Diagnosis:
         return moved.told
 
 
-def _in_one(moved: Sequence[_Moved]) -> _Moved:
-    """Return motions one after the other as one."""
-    return _Moved(functools.reduce(composed, (each.wheels for each in moved)), moved[0].before, moved[-1].after)
-
-
 def composed(first: Odometry, then: Odometry) -> Odometry:
     """Return two motions one after the other as one, in the frame before the first."""
-    G, R = np.eye(3), np.eye(3)
-    R[:2, :2] = rotation(first.motion[2])
-    G[:2, 2] = J @ R[:2, :2] @ then.motion[:2]
-    return Odometry(compose(first.motion, then.motion), G @ first.cov @ G.T + R @ then.cov @ R.T)
+    step = move(first.motion, then.motion)
+    return Odometry(step.pose_world, step.F @ first.cov @ step.F.T + step.noise(then.cov))
 
 
 def _are_alike(one: Scan, other: Scan) -> bool:
-    return bool(np.array_equal(one.ranges_m, other.ranges_m, equal_nan=True))
+    return one.ranges_m.tobytes() == other.ranges_m.tobytes()
 
 
 class _Weighed:

@@ -56,7 +56,7 @@ class Scan:
                 f"expected a scan that ends after it began, found {self.start_s:g} s to {self.time_s:g} s:"
                 " give both on one clock"
             )
-        if not self.range_max_m > 0.0 or not np.all(np.asarray(self.sigma_m) >= 0.0):
+        if not self.range_max_m > 0.0 or not (np.asarray(self.sigma_m) >= 0.0).all():
             raise RobotError(
                 "expected a maximum range above 0 m and a noise of 0 m or more, found others: correct them"
             )
@@ -95,7 +95,7 @@ class Scan:
         Scanners lose single returns, so a beam without one counts as free only if its neighbours have none either.
         """
         before, after = self._beside
-        sure = np.isposinf(self.ranges_m) & np.isposinf(before) & np.isposinf(after)
+        sure = (self.ranges_m == np.inf) & (before == np.inf) & (after == np.inf)
         return np.where(np.isfinite(self.ranges_m), self.ranges_m, np.where(sure, self.range_max_m, 0.0))
 
     @cached_property
@@ -106,7 +106,7 @@ class Scan:
         """
         before, after = self._beside
         lone = ~np.isfinite(self.ranges_m) & np.isfinite(np.maximum(before, after))
-        free = np.where(np.isposinf(self.ranges_m), self.range_max_m, self.ranges_m)
+        free = np.where(self.ranges_m == np.inf, self.range_max_m, self.ranges_m)
         shown = np.where(lone, np.minimum(before, after), free)
         return np.where(np.isnan(shown), 0.0, shown)
 
@@ -117,7 +117,7 @@ class Scan:
         around = np.concatenate([[last], self.ranges_m, [first]])
         return around[:-2], around[2:]
 
-    @property
+    @cached_property
     def sigmas_m(self) -> Float[np.ndarray, " k"]:
         """Standard deviation of each beam's range error at its measured range, m."""
         sigmas = np.broadcast_to(np.asarray(self.sigma_m, dtype=np.float64), self.ranges_m.shape)
@@ -167,10 +167,10 @@ def _check_bearings(bearings_rad: Float[np.ndarray, " k"], count: int) -> None:
     found, todo = "", "`Scan.ordered` puts them in order"
     if len(bearings_rad) != count or count < 2:
         found, todo = f"{len(bearings_rad)} bearings of {count} ranges", "give as many of both, two at least"
-    elif not np.all(np.isfinite(bearings_rad)):
+    elif not np.isfinite(bearings_rad).all():
         found, todo = "some that are no numbers", "correct them"
     else:
-        steps = np.diff(bearings_rad)
+        steps = bearings_rad[1:] - bearings_rad[:-1]
         mean = float(steps.sum()) / (count - 1)
         if mean <= 0.0:
             found = "descending ones"
@@ -208,7 +208,7 @@ class Odometry:
 
     def __post_init__(self) -> None:
         """Raise RobotError for numbers that are not finite."""
-        if not (np.all(np.isfinite(self.motion)) and np.all(np.isfinite(self.cov))):
+        if not (np.isfinite(self.motion).all() and np.isfinite(self.cov).all()):
             raise RobotError("expected odometry of finite numbers, found others: correct what the wheels report")
 
     @property
@@ -224,7 +224,7 @@ class Odometry:
     @property
     def states_its_error(self) -> bool:
         """Whether a motion has any uncertainty; a rest may have none."""
-        return bool(np.any(self.cov.diagonal() > 0.0)) or not np.any(self.motion)
+        return bool((self.cov.diagonal() > 0.0).any()) or not self.motion.any()
 
 
 @dataclass(frozen=True)

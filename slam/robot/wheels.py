@@ -32,7 +32,8 @@ class WheelSpec:
 
     def slip_variances(self, forward_m: float, turn_rad: float) -> Float[np.ndarray, "3"]:
         """Return the variances m^2 of the left, right and lateral slip over an arc."""
-        left, right = (abs(way) for way in self.ways(forward_m, turn_rad))
+        left, right = self.ways(forward_m, turn_rad)
+        left, right = abs(left), abs(right)
         return np.array([self.slip**2 * left, self.slip**2 * right, self.lateral_slip**2 * 0.5 * (left + right)])
 
     def over_arc(self, forward_m: float, turn_rad: float) -> Odometry:

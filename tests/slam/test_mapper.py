@@ -82,8 +82,8 @@ def test_a_moved_world_gives_the_moved_map(backend, world):
     assert [chain.walls for chain in there.chains] == [chain.walls for chain in here.chains]
 
 
-def test_a_matcher_given_in_its_place_is_asked_twice_a_scan_and_believed():
-    """First what is clear, then the rest; an oracle that knows the true wall of every segment is obeyed."""
+def test_a_matcher_given_in_its_place_is_asked_for_the_clear_and_then_for_the_rest_and_believed():
+    """Nothing is asked where none is left; an oracle that knows the true wall of every segment is obeyed."""
     asked = []
 
     def oracle(segments, walls, joint, config, *, clear_only=False):
@@ -91,7 +91,8 @@ def test_a_matcher_given_in_its_place_is_asked_twice_a_scan_and_believed():
         return match(segments, walls, joint, config, clear_only=clear_only)
 
     updates = list(walk(SQUARE, PLACES, matcher=oracle, config=AT_ITS_WORD))
-    assert asked == [True, False] * len(PLACES)
+    assert asked[:2] == [True, False]
+    assert asked.count(True) == len(PLACES) >= asked.count(False)
     for mine, usual in zip(updates, walk(SQUARE, PLACES), strict=True):
         np.testing.assert_array_equal(mine.map.belief.means, usual.map.belief.means)
         np.testing.assert_array_equal(mine.map.belief.pose_cov, usual.map.belief.pose_cov)

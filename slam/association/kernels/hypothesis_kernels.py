@@ -166,12 +166,11 @@ def _distance_given(c: int, seed: int, e: Float[np.ndarray, " k"], S: Float[np.n
     """Return the squared Mahalanobis distance of an observation, given that the seed is right."""
     i, j = 2 * c, 2 * seed
     det = S[j, j] * S[j + 1, j + 1] - S[j, j + 1] * S[j + 1, j]
-    gain, left = np.empty((2, 2)), np.empty(2)
-    for row in range(2):
-        gain[row, 0] = (S[i + row, j] * S[j + 1, j + 1] - S[i + row, j + 1] * S[j + 1, j]) / det
-        gain[row, 1] = (S[i + row, j + 1] * S[j, j] - S[i + row, j] * S[j, j + 1]) / det
-        left[row] = e[i + row] - gain[row, 0] * e[j] - gain[row, 1] * e[j + 1]
-    s00 = S[i, i] - gain[0, 0] * S[i, j] - gain[0, 1] * S[i, j + 1]
-    s01 = S[i, i + 1] - gain[0, 0] * S[i + 1, j] - gain[0, 1] * S[i + 1, j + 1]
-    s11 = S[i + 1, i + 1] - gain[1, 0] * S[i + 1, j] - gain[1, 1] * S[i + 1, j + 1]
-    return squared_distance(left[0], left[1], s00, s01, s11)
+    k00 = (S[i, j] * S[j + 1, j + 1] - S[i, j + 1] * S[j + 1, j]) / det
+    k01 = (S[i, j + 1] * S[j, j] - S[i, j] * S[j, j + 1]) / det
+    k10 = (S[i + 1, j] * S[j + 1, j + 1] - S[i + 1, j + 1] * S[j + 1, j]) / det
+    k11 = (S[i + 1, j + 1] * S[j, j] - S[i + 1, j] * S[j, j + 1]) / det
+    s00 = S[i, i] - k00 * S[i, j] - k01 * S[i, j + 1]
+    s01 = S[i, i + 1] - k00 * S[i + 1, j] - k01 * S[i + 1, j + 1]
+    s11 = S[i + 1, i + 1] - k10 * S[i + 1, j] - k11 * S[i + 1, j + 1]
+    return squared_distance(e[i] - k00 * e[j] - k01 * e[j + 1], e[i + 1] - k10 * e[j] - k11 * e[j + 1], s00, s01, s11)

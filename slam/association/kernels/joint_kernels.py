@@ -80,17 +80,23 @@ def seen_halfway(
     line: Int[np.ndarray, " m"],
     lines: Float[np.ndarray, "m 2"],
     lines_cov: Float[np.ndarray, "m 2 2"],
-) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2 3"], Float[np.ndarray, "t k"], Float[np.ndarray, "k k"]]:
-    """Return e, H_pose, P H' and S of seen lines, linearised halfway to where they put the pose."""
+) -> tuple[
+    Float[np.ndarray, " k"],
+    Float[np.ndarray, "k 3"],
+    Float[np.ndarray, "t k"],
+    Float[np.ndarray, "k k"],
+    Float[np.ndarray, "k k"],
+]:
+    """Return e, H_pose, P H', S and its W of seen lines, linearised halfway to where they put the pose."""
     means = mean[3:].reshape((-1, 2))[line]
     pose = mean[:3]
     e, H_pose, H_line, R = innovation_rows(pose, anchors[line], means, lines, lines_cov, pose[:2], means[:, 0].copy())
     PHt, S = taken_together(cov, line, H_pose, H_line, R)
-    gain = gain_of(PHt, whitening(S))
-    turn = np.zeros(len(line))
+    W, turn = whitening(S), np.zeros(len(line))
+    of_heading, of_lines = gain_of(PHt[2:3], W)[0], gain_of(PHt[3 + 2 * line], W)
     for k in range(len(line)):
         for i in range(2 * len(line)):
-            turn[k] += (gain[3 + 2 * line[k], i] - gain[2, i]) * e[i // 2, i % 2]
+            turn[k] += (of_lines[k, i] - of_heading[i]) * e[i // 2, i % 2]
     turn_halfway(e, H_pose, H_line, lines, lines_cov, turn)
     PHt, S = taken_together(cov, line, H_pose, H_line, R)
-    return e, H_pose, PHt, S
+    return e.ravel(), H_pose.reshape((-1, 3)), PHt, S, whitening(S)

@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Float
 
 from ...geometry.compiled import compiled
-from ...geometry.matrix_kernels import whitening
 
 SINGULAR = 1e-12
 """A part of a motion's variance below this share of it is rounding: the motion has no noise of its own there."""
@@ -39,11 +38,13 @@ def motion_root(cov: Float[np.ndarray, "3 3"], turn_rad: float) -> Float[np.ndar
 def surprise(
     e: Float[np.ndarray, " k"],
     H_pose: Float[np.ndarray, "k 3"],
-    S: Float[np.ndarray, "k k"],
+    W: Float[np.ndarray, "k k"],
     G: Float[np.ndarray, "3 3"],
 ) -> tuple[float, Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Return e' S^-1 e, and along the axes of A = G' H' S^-1 H G its eigenvalues a and w = G' H' S^-1 e."""
-    W = whitening(S)
+    """Return e' S^-1 e, and along the axes of A = G' H' S^-1 H G its eigenvalues a and w = G' H' S^-1 e.
+
+    W whitens e: W S W' = I.
+    """
     k = len(e)
     squared, A, told = 0.0, np.zeros((3, 3)), np.zeros(3)
     white = np.empty(3)

@@ -24,20 +24,20 @@ class RangeBias:
 
     def __init__(self, config: RangesConfig = DEFAULTS) -> None:
         self._config = config
-        self._sums: dict[int, Float[np.ndarray, 2]] = {}
+        self._sums: dict[int, tuple[float, float]] = {}
         """Of each wall, by its id: information and score."""
         self._prior = np.array([config.bias_m**-2, 0.0])
         self._total = self._prior.copy()
         self._scans = 0
+        self.sigma_m = self._sigma_m()
+        """Its standard deviation m: by the noise of the beams, or by how walls differ, whichever is larger."""
 
     @property
     def mean_m(self) -> float:
         """The likeliest bias m."""
         return float(self._total[1] / self._total[0])
 
-    @property
-    def sigma_m(self) -> float:
-        """Its standard deviation m: by the noise of the beams, or by how walls differ, whichever is larger."""
+    def _sigma_m(self) -> float:
         information, mean = float(self._total[0]), self.mean_m
         sums = np.array(list(self._sums.values())).reshape(-1, 2)
         spread = float(np.sqrt(np.sum((sums[:, 1] - mean * sums[:, 0]) ** 2))) / information
@@ -79,8 +79,10 @@ class RangeBias:
 
     def learn(self, sums: Float[np.ndarray, "s 2"], walls: Int[np.ndarray, " s"]) -> None:
         """Take in the sums of a scan's segments, each of the wall of this id."""
-        for wall, each in zip(walls.tolist(), sums, strict=True):
-            if each[0] > 0.0:
-                self._sums[wall] = self._sums.get(wall, 0.0) + each
+        for wall, (information, score) in zip(walls.tolist(), sums.tolist(), strict=True):
+            if information > 0.0:
+                before = self._sums.get(wall, (0.0, 0.0))
+                self._sums[wall] = before[0] + information, before[1] + score
         self._total = self._total + sums.sum(axis=0)
         self._scans += 1
+        self.sigma_m = self._sigma_m()

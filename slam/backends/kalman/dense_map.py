@@ -13,6 +13,7 @@ from scipy.linalg.lapack import dpotrf
 from ...estimation.backend import POSE, Joint, columns_of
 from ...estimation.models import Initialisation, Linear, Motion
 from ...geometry.poses import wrap
+from . import kernels
 
 SPARE = 16
 """Slots are added by so many at least, and by an eighth of those there are."""
@@ -53,7 +54,7 @@ class DenseMap:
     def joint(self, rows: Int[np.ndarray, " m"]) -> Joint:
         """Return the Gaussian of the pose and some lines."""
         columns = self._columns(rows)
-        return Joint(self._x[columns], self._block(columns), self.anchors[rows])
+        return Joint(self._x[columns], kernels.block(self._P, columns), self.anchors[rows])
 
     def move(self, motion: Motion, Q: Float[np.ndarray, "3 3"]) -> None:
         """Take the pose along a motion: its error becomes F times what it was, and noise of covariance Q."""
@@ -69,7 +70,7 @@ class DenseMap:
         slots = np.array([self._free.pop() for _ in range(m)], dtype=np.int64)
         columns = (POSE + 2 * slots[:, None] + np.arange(2)).ravel()
         G = new.G_pose.reshape(2 * m, POSE)
-        across = G @ self._across(np.arange(POSE))
+        across = G @ kernels.across(self._P, np.arange(POSE))
         block = (across[:, :POSE] @ G.T).reshape(m, 2, m, 2)
         each = np.arange(m)
         block[each, :, each, :] += noise
@@ -103,7 +104,7 @@ class DenseMap:
         U = np.zeros((len(self._x), POSE), order="F")
         U[:POSE] = by_pose
         U[self._columns(np.arange(len(self.ids)))[POSE:]] = by_line.reshape(-1, POSE)
-        B = self._across(np.arange(POSE)).T + 0.5 * U @ self.pose_cov
+        B = kernels.across(self._P, np.arange(POSE)).T + 0.5 * U @ self.pose_cov
         self._P = dsyr2k(1.0, U, B, beta=1.0, c=self._P, lower=1, overwrite_c=1)
         self._mirror_pose()
 
@@ -139,18 +140,8 @@ class DenseMap:
     def _predicted(self, model: Linear) -> tuple[Float[np.ndarray, "t k"], Float[np.ndarray, "k k"]]:
         """Return P H' and H P H'."""
         columns = self._columns(model.rows)
-        PHt = (model.H @ self._across(columns)).T
+        PHt = (model.H @ kernels.across(self._P, columns)).T
         return PHt, model.H @ PHt[columns]
-
-    def _across(self, columns: Int[np.ndarray, " c"]) -> Float[np.ndarray, "c t"]:
-        """Return whole rows of P, which are whole columns, from the triangle that holds."""
-        right = np.arange(len(self._x)) >= columns[:, None]
-        return np.where(right, self._P.T[columns], self._P[columns])
-
-    def _block(self, columns: Int[np.ndarray, " c"]) -> Float[np.ndarray, "c c"]:
-        """Return the part of P of some columns, from the triangle that holds."""
-        part = self._P[columns[:, None], columns]
-        return np.where(columns[:, None] >= columns, part, part.T)
 
     def _mirror_pose(self) -> None:
         self._P[0, 1:POSE], self._P[1, 2] = self._P[1:POSE, 0], self._P[2, 1]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chainslam.slam.association.joint_compatibility import relocate
+from chainslam.slam.association.joint_compatibility import relocate, seen_halfway
 from chainslam.slam.association.kernels.rest_kernels import compatible
 from chainslam.slam.estimation.backend import Joint, Observations
 from chainslam.slam.estimation.gates import gate_level, pair_levels
@@ -41,7 +41,7 @@ def test_relocation_is_conditioning_in_information_form():
         rows = slice(2 * k, 2 * k + 2)
         information = information + H[rows].T @ np.linalg.inv(R[k]) @ H[rows]
         shift += H[rows].T @ np.linalg.solve(R[k], innovation[rows])
-    found = relocate(joint, ids, Observations(ids[chosen], lines, cov))
+    found = relocate(joint, seen_halfway(joint, ids, Observations(ids[chosen], lines, cov)))
     expected = np.linalg.inv(information)
     np.testing.assert_allclose(found.cov, expected, atol=1e-8)
     np.testing.assert_allclose(found.mean, mean + expected @ shift, atol=1e-6)
@@ -60,7 +60,7 @@ def test_relocation_finds_the_pose_after_a_slip_that_bends_its_measurements(slip
     beside = np.array([1.0, -0.5, 0.8])
     turn = np.array([[[1.0, 0.0], [t, 1.0]] for t in beside])
     cov = turn @ np.diag([0.002, 0.001]) ** 2 @ turn.swapaxes(1, 2)
-    found = relocate(joint, np.arange(3), Observations(np.arange(3), lines, cov))
+    found = relocate(joint, seen_halfway(joint, np.arange(3), Observations(np.arange(3), lines, cov)))
     error = found.mean[:3] - true_pose
     assert error @ np.linalg.solve(found.cov[:3, :3], error) < 0.3
 
@@ -68,7 +68,7 @@ def test_relocation_finds_the_pose_after_a_slip_that_bends_its_measurements(slip
 def test_relocation_by_nothing_is_no_relocation():
     joint = Joint(np.zeros(5), np.eye(5), np.ones((1, 2)))
     nothing = Observations(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))
-    assert relocate(joint, np.array([5]), nothing) is joint
+    assert relocate(joint, seen_halfway(joint, np.array([5]), nothing)) is joint
 
 
 def test_the_observation_that_the_others_contradict_is_dropped_though_alone_it_would_pass():

@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from chainslam.sim.lidar import LidarConfig, RangeFinder
-from chainslam.slam.association.joint_compatibility import relocate
+from chainslam.slam.association.joint_compatibility import relocate, seen_halfway
 from chainslam.slam.association.matching import KnownWalls, MatchingConfig, match
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.estimation.backend import Joint
@@ -221,7 +221,11 @@ def test_a_slip_of_the_wheels_does_not_shift_a_wall_onto_the_next_rooms(slip_rad
     segments = straight_pieces([*PIECES, [[3.0, 0.05], [3.0, 1.2]]])
     clear = match(segments, walls, joint, clear_only=True)
     assert clear.pairs.tolist() == [[0, 0], [1, 1], [2, 2]]
-    rest = match(segments.take(clear.unmatched), walls, relocate(joint, walls.ids, clear.observations(segments)))
+    rest = match(
+        segments.take(clear.unmatched),
+        walls,
+        relocate(joint, seen_halfway(joint, walls.ids, clear.observations(segments))),
+    )
     assert rest.unmatched.tolist() == [0]
     assert not len(rest.doubtful)
 
@@ -239,7 +243,11 @@ def test_a_slip_of_the_wheels_excuses_no_wall_that_the_others_contradict(slip_ra
     segments = straight_pieces([bent, *PIECES[1:]])
     clear = match(segments, walls, joint, clear_only=True)
     assert clear.pairs.tolist() == [[1, 1], [2, 2]]
-    rest = match(segments.take(clear.unmatched), walls, relocate(joint, walls.ids, clear.observations(segments)))
+    rest = match(
+        segments.take(clear.unmatched),
+        walls,
+        relocate(joint, seen_halfway(joint, walls.ids, clear.observations(segments))),
+    )
     assert rest.doubtful.tolist() == [0]
 
 

@@ -47,22 +47,21 @@ def test_the_nis_of_honest_observations_is_of_a_chi_square_variable():
     """Poses and lines are drawn from the joint Gaussian, observations from their covariance."""
     rng = np.random.default_rng(11)
     joint, G = belief(rng)
-    found = [surprise(joint, IDS, observed(joint, rng), G)[0] for _ in range(400)]
+    found = [surprise(seen_halfway(joint, IDS, observed(joint, rng)), G)[0] for _ in range(400)]
     squared = np.array([nis.squared for nis in found])
     assert {nis.dof for nis in found} == {6}
     assert squared.mean() == pytest.approx(6.0, abs=4.0 * np.sqrt(12.0 / 400))
     assert squared.var() == pytest.approx(12.0, rel=0.4)
-    assert surprise(joint, IDS, NOTHING, G) == (NO_NIS, None)
+    assert surprise(seen_halfway(joint, IDS, NOTHING), G) == (NO_NIS, None)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_gain_in_likelihood_is_that_of_the_dense_gaussians(seed):
     rng = np.random.default_rng(seed)
     joint, G = belief(rng)
-    seen_lines = observed(joint, rng, G, 3.0)
-    innovation = surprise(joint, IDS, seen_lines, G)[1]
-    seen = seen_halfway(joint, IDS, seen_lines)
-    HG = seen.H_pose.reshape(-1, 3) @ G
+    seen = seen_halfway(joint, IDS, observed(joint, rng, G, 3.0))
+    innovation = surprise(seen, G)[1]
+    HG = seen.H_pose @ G
     stated = multivariate_normal.logpdf(seen.e, cov=seen.S)
     wider = [multivariate_normal.logpdf(seen.e, cov=seen.S + (f**2 - 1.0) * HG @ HG.T) for f in FACTORS]
     np.testing.assert_allclose(gains_of(innovation), np.array(wider) - stated, rtol=1e-6)
@@ -72,7 +71,7 @@ def test_the_gain_in_likelihood_is_that_of_the_dense_gaussians(seed):
 def test_what_a_scan_tells_of_the_motion_has_the_variance_of_its_noise(factor):
     rng = np.random.default_rng(3)
     joint, G = belief(rng)
-    told = [surprise(joint, IDS, observed(joint, rng, G, factor), G)[1] for _ in range(600)]
+    told = [surprise(seen_halfway(joint, IDS, observed(joint, rng, G, factor)), G)[1] for _ in range(600)]
     a, w = np.array([one.a for one in told]), np.array([one.w for one in told])
     expected = a * (1.0 + (factor**2 - 1.0) * a)
     np.testing.assert_allclose(np.mean(w**2 / expected, axis=0), 1.0, atol=4.0 * np.sqrt(2.0 / 600))

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from scipy.stats import chi2
 
-from chainslam.slam.association.joint_compatibility import relocate
+from chainslam.slam.association.joint_compatibility import relocate, seen_halfway
 from chainslam.slam.association.matching import NO_MATCHES, KnownWalls, MatchingConfig
 from chainslam.slam.association.methods import METHODS, Method
 from chainslam.slam.association.paper_matching import match_alone, relocate_robot
@@ -14,8 +14,8 @@ from chainslam.slam.backends import BACKENDS
 from chainslam.slam.config import MapperConfig
 from chainslam.slam.estimation.backend import Joint, Observations
 from chainslam.slam.extraction.segments import Segments
-from chainslam.slam.geometry.lines import segment_distances
 from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.geometry.segment_kernels import segment_distances
 from chainslam.slam.mapper import Mapper
 
 PAPER = MatchingConfig(method="paper")
@@ -134,9 +134,9 @@ def test_there_may_be_no_wall_and_no_segment():
 
 def test_the_robot_alone_is_moved_before_all_is_matched_again():
     segments, walls, joint = scene(np.random.default_rng(4), correlated=False)
-    seen = match_alone(segments, walls, joint, PAPER).observations(segments)
-    moved, both = relocate_robot(joint, IDS, seen), relocate(joint, IDS, seen)
-    assert len(seen)
+    seen = seen_halfway(joint, IDS, match_alone(segments, walls, joint, PAPER).observations(segments))
+    moved, both = relocate_robot(joint, seen), relocate(joint, seen)
+    assert len(seen.e)
     assert np.array_equal(moved.mean[:3], both.mean[:3])
     assert not np.allclose(moved.mean[:3], joint.mean[:3])
     assert np.array_equal(moved.mean[3:], joint.mean[3:])
@@ -157,7 +157,7 @@ def test_the_second_matches_replace_the_first_ones():
     for clear_stay in (False, True):
         view = View(segments, walls, joint, Method(counting, relocate_robot, clear_stay), PAPER)
         clear = view.match_clear()
-        again = view.match_again(clear, joint)
+        again = view.match_again(clear, view.seen(clear.observations(segments)))
         assert asked == [len(segments), len(clear.unmatched) if clear_stay else len(segments)]
         assert len(again.pairs) == len(clear.pairs) > 0
         asked.clear()
@@ -189,4 +189,4 @@ def test_distances_of_segments_are_those_of_shapely():
 def test_a_relocation_without_matches_changes_nothing():
     _, _, joint = scene(np.random.default_rng(2))
     none = Observations(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))
-    assert np.array_equal(relocate_robot(joint, IDS, none).cov, joint.cov)
+    assert np.array_equal(relocate_robot(joint, seen_halfway(joint, IDS, none)).cov, joint.cov)

@@ -5,6 +5,8 @@ import pytest
 import shapely
 
 from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.association.joint_compatibility import seen_halfway
+from chainslam.slam.association.kernels import near_kernels
 from chainslam.slam.association.matching import KnownWalls, MatchingConfig
 from chainslam.slam.association.methods import METHODS
 from chainslam.slam.association.view import near_segments
@@ -66,7 +68,12 @@ def test_walls_far_from_all_segments_change_no_match(name, seed):
     method, few = METHODS[name], taken(walls, joint, near)
     first = [method.matcher(segments, *known, CONFIG, clear_only=True) for known in ((walls, joint), few)]
     again = [
-        method.matcher(segments, known, method.relocate(prior, known.ids, clear.observations(segments)), CONFIG)
+        method.matcher(
+            segments,
+            known,
+            method.relocate(prior, seen_halfway(prior, known.ids, clear.observations(segments))),
+            CONFIG,
+        )
         for (known, prior), clear in zip(((walls, joint), few), first, strict=True)
     ]
     assert len(again[0].pairs) > 3
@@ -90,6 +97,19 @@ def test_the_more_the_robot_is_lost_the_farther_it_looks():
     lost, found = (near_segments(segments, ends_world, turned, cov, CONFIG) for cov in (sure, unsure))
     assert np.all(found[lost])
     assert np.count_nonzero(found) > np.count_nonzero(lost)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_near_are_the_walls_that_shapely_finds_within_reach(seed):
+    segments, _, joint, ends_world = a_scan(seed)
+    pose, off_m, off_rad = joint.mean[:3], 0.4, 0.1
+    found = np.zeros(len(ends_world), dtype=bool)
+    for ends in segments.ends:
+        seen = shapely.LineString(ends @ rotation(pose[2]).T + pose[:2])
+        reach = off_m + off_rad * np.hypot(*ends.T).max()
+        found |= shapely.distance(seen, shapely.linestrings(ends_world)) < reach
+    assert 0 < np.count_nonzero(found) < len(found)
+    np.testing.assert_array_equal(near_kernels.near_segments(segments.ends, ends_world, pose, off_m, off_rad), found)
 
 
 def test_without_segments_or_walls_nothing_is_near():

@@ -5,6 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from chainslam.slam.backends.kalman import kernels
 from chainslam.slam.backends.kalman.dense_map import SPARE, DenseMap, cholesky
 from chainslam.slam.estimation.models import Initialisation, Linear, Motion
 
@@ -79,6 +80,15 @@ def test_what_is_common_to_all_errors_is_added_in_place():
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 1e6
+
+
+def test_parts_of_the_triangle_that_holds_are_those_of_the_whole():
+    root, rows = np.random.default_rng(6).normal(size=(11, 11)), np.array([0, 1, 2, 9, 10, 3, 4])
+    whole = root + root.T
+    held = np.asfortranarray(np.tril(whole))
+    np.testing.assert_array_equal(kernels.across(held, rows), whole[rows])
+    np.testing.assert_array_equal(kernels.block(held, rows), whole[np.ix_(rows, rows)])
+    assert kernels.across(held, rows).flags.c_contiguous
 
 
 def test_a_covariance_that_is_none_is_told():
