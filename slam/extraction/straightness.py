@@ -14,7 +14,7 @@ from jaxtyping import Float
 from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.quantities import Angle, Distance
 from .segments import Segments
-from .straightness_kernels import faces_cov, middles_of, misfit_variances
+from .straightness_kernels import faces_cov, middles_of
 
 
 @dataclass(frozen=True)
@@ -32,15 +32,13 @@ class StraightnessConfig:
 
 def cov_of_faces(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what the covariances of (alpha, r) of the segments of a scan lack, since some are of several faces."""
-    edges = faces_cov(
-        segments.lines, segments.ends, _misfits_m2(segments, config), float(config.edge_m), float(config.shared.face_m)
-    )
+    edges = _faces_cov(segments, config, float(config.edge_m), float(config.shared.face_m))
     return edges + cov_of_bows(segments, config) if config.bow_rad or config.bow_m else edges
 
 
 def cov_of_misfits(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what they lack where the residuals of a segment show that it is of several faces."""
-    return faces_cov(segments.lines, segments.ends, _misfits_m2(segments, config), 0.0, 1.0)
+    return _faces_cov(segments, config, 0.0, 1.0)
 
 
 def cov_of_bows(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
@@ -52,6 +50,8 @@ def cov_of_bows(segments: Segments, config: StraightnessConfig = StraightnessCon
     return cov
 
 
-def _misfits_m2(segments: Segments, config: StraightnessConfig) -> Float[np.ndarray, " s"]:
-    sigmas = float(config.shared.outlier_sigmas)
-    return misfit_variances(segments.cov, segments.chi2, segments.beam_counts, sigmas)
+def _faces_cov(
+    segments: Segments, config: StraightnessConfig, edge_m: float, face_m: float
+) -> Float[np.ndarray, "s 2 2"]:
+    fits = segments.cov, segments.chi2, segments.beam_counts, float(config.shared.outlier_sigmas)
+    return faces_cov(segments.lines, segments.ends, *fits, edge_m, face_m)

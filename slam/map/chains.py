@@ -57,9 +57,9 @@ def connect(
     rows = (~walls.tentative).nonzero()[0]
     if not len(rows):
         return ()
-    ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
+    ends, ids, lines = walls.ends_world[rows], walls.ids[rows], (walls.belief.anchors[rows], walls.belief.means[rows])
     near_m, corner_m = float(max(shared.thickness_m, shared.door_m)), float(shared.short_m)
-    walked, starts, closed, corners = linked(ends, lines, _aside(ids, set_aside), near_m, corner_m, _reach(shared))
+    walked, starts, closed, corners = linked(ends, *lines, _aside(ids, set_aside), near_m, corner_m, _reach(shared))
     names, ends = ids[walked].tolist(), ends[walked]
     chains = [
         _chain(tuple(names[start:stop]), is_closed, ends[start:stop], corners[start:stop])

@@ -32,7 +32,8 @@ class Reach(NamedTuple):
 @compiled
 def linked(
     ends: Float[np.ndarray, "n 2 2"],
-    lines: Float[np.ndarray, "n 2"],
+    anchors: Float[np.ndarray, "n 2"],
+    means: Float[np.ndarray, "n 2"],
     aside: Bool[np.ndarray, "n 2"],
     near_m: float,
     corner_m: float,
@@ -47,7 +48,9 @@ def linked(
     both_aside = np.zeros(len(pairs), np.bool_)
     for k in range(len(pairs)):
         both_aside[k] = aside[pairs[k, 0], HEAD] and aside[pairs[k, 1], TAIL]
-    gaps, allowed = joinable(pairs, ends, lines[:, 0].copy(), both_aside, reach)
+    alpha, lines = means[:, 0].copy(), means.copy()
+    lines[:, 1] += np.cos(alpha) * anchors[:, 0] + np.sin(alpha) * anchors[:, 1]
+    gaps, allowed = joinable(pairs, ends, alpha, both_aside, reach)
     successor = successors(pairs, gaps, allowed, len(ends))
     before = np.flatnonzero(successor >= 0)
     after = successor[before]

@@ -97,7 +97,10 @@ def test_runs_are_the_connected_parts_of_the_links(seed):
 def test_linked_walls_meet_where_their_lines_cross_near_both_ends_or_amid_these(seed):
     ends, lines = walls(seed)
     aside = np.random.default_rng(seed).random((len(ends), 2)) < 0.5
-    walked, starts, closed, corners = linked(ends, lines, aside, 0.9, 0.5, REACH)
+    anchors = np.random.default_rng(seed).normal(size=(len(ends), 2))
+    offsets = np.sum(anchors * np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])]), axis=1)
+    means = np.column_stack([lines[:, 0], lines[:, 1] - offsets])
+    walked, starts, closed, corners = linked(ends, anchors, means, aside, 0.9, 0.5, REACH)
     for (i, j), is_closed in zip(pairwise(starts), closed, strict=True):
         for one, other, corner in zip(walked[i:j], np.roll(walked[i:j], -1), corners[i:j], strict=True):
             if one == walked[j - 1] and not is_closed:
