@@ -52,7 +52,8 @@ class MapUpdate:
         `unsure` adds to a belief about the scanner what is unknown of its ranges.
         """
         told, motion = self.map.told, self.localisation.unstated_motion
-        update = replace(self, map=replace(told, belief=unsure(told.belief)))
+        belief = unsure(told.belief)
+        update = replace(self, map=told if belief is told.belief else replace(told, belief=belief))
         if scanner.is_at_axle:
             return update
         of_body = None if motion is None else odometry_of_body(motion, scanner)
@@ -107,12 +108,12 @@ class MapKeeper:
         owners = np.full(len(segments), -1, dtype=np.int64)
         owners[matches.pairs[:, 0]] = matches.pairs[:, 1]
         owners[segments.is_tentative] = -1
-        doubtful = set(matches.doubtful.tolist())
-        fresh = np.array([row for row in matches.unmatched.tolist() if row not in doubtful], dtype=np.int64)
-        few, fresh = fresh[segments.is_tentative[fresh]], fresh[~segments.is_tentative[fresh]]
-        rows, odds = self._candidates.see(self.backend.belief.pose_world, scan, segments.take(few))
-        believed = few[rows]
-        fresh = np.sort(np.concatenate([fresh, believed]))
+        is_new = np.zeros(len(segments), dtype=bool)
+        is_new[matches.unmatched], is_new[matches.doubtful] = True, False
+        few = (is_new & segments.is_tentative).nonzero()[0]
+        believed, odds = self._candidates.see(self.backend.belief.pose_world, scan, segments, few)
+        is_new[few], is_new[believed] = False, True
+        fresh = is_new.nonzero()[0]
         if len(fresh):
             begun = segments.take(fresh)
             straightness = self.config.walls.reliability.straightness
@@ -122,8 +123,8 @@ class MapKeeper:
             fresh = fresh[told]
         if len(fresh):
             owners[fresh] = self.backend.grow(begun.lines[told], cov[told], seen_centres(segments, fresh))
-        likely = dict(zip(owners[believed].tolist(), odds.tolist(), strict=True))
-        return owners, {owner: likely[owner] for owner in likely if owner >= 0}
+        likely = zip(owners[believed].tolist(), odds.tolist(), strict=True)
+        return owners, {owner: log_odds for owner, log_odds in likely if owner >= 0}
 
     def _observed(
         self,
@@ -157,8 +158,7 @@ class MapKeeper:
         if self.config.merging is None:
             return walls, ()
         merged: list[tuple[int, int]] = []
-        touched, one_wall = set(owners[owners >= 0].tolist()), self.config.matching.one_wall
-        while twice := duplicate_of(walls, touched, one_wall, self.config.merging):
+        while twice := duplicate_of(walls, owners, self.config.matching.one_wall, self.config.merging):
             keep, drop = twice
             self.landmarks.merge(self.backend.belief, keep, drop)
             self.backend.merge(keep, drop)

@@ -12,10 +12,9 @@ import numpy as np
 from jaxtyping import Float
 
 from ..estimation.shared import SharedConfig, of_shared
-from ..geometry.lines import directions
 from ..geometry.quantities import Angle, Distance
 from .segments import Segments
-from .straightness_kernels import edge_cov, faces_cov, misfit_variances
+from .straightness_kernels import faces_cov, middles_of
 
 
 @dataclass(frozen=True)
@@ -33,38 +32,26 @@ class StraightnessConfig:
 
 def cov_of_faces(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what the covariances of (alpha, r) of the segments of a scan lack, since some are of several faces."""
-    edges = faces_cov(
-        segments.lines, segments.ends, _misfits_m2(segments, config), float(config.edge_m), float(config.shared.face_m)
-    )
+    edges = _faces_cov(segments, config, float(config.edge_m), float(config.shared.face_m))
     return edges + cov_of_bows(segments, config) if config.bow_rad or config.bow_m else edges
 
 
 def cov_of_misfits(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what they lack where the residuals of a segment show that it is of several faces."""
-    return faces_cov(segments.lines, segments.ends, _misfits_m2(segments, config), 0.0, 1.0)
-
-
-def cov_of_breaks(
-    segments: Segments, misfits_m2: Float[np.ndarray, " s"], lengths_m: Float[np.ndarray, " s"]
-) -> Float[np.ndarray, "s 2 2"]:
-    """Return what they lack since each shows one face of a wall of several, of such misfit and length."""
-    return edge_cov(misfits_m2, lengths_m, _middles_m(segments))
+    return _faces_cov(segments, config, 0.0, 1.0)
 
 
 def cov_of_bows(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what they lack since no wall is straight: any direction and distance is that of the part in sight."""
-    middles = _middles_m(segments)
+    middles = middles_of(segments.lines, segments.ends)
     cov = np.empty((len(middles), 2, 2))
     cov[:, 0, 0], cov[:, 1, 1] = config.bow_rad**2, config.bow_m**2 + (config.bow_rad * middles) ** 2
     cov[:, 0, 1] = cov[:, 1, 0] = config.bow_rad**2 * middles
     return cov
 
 
-def _misfits_m2(segments: Segments, config: StraightnessConfig) -> Float[np.ndarray, " s"]:
-    sigmas = float(config.shared.outlier_sigmas)
-    return misfit_variances(segments.cov, segments.chi2, segments.beam_counts, sigmas)
-
-
-def _middles_m(segments: Segments) -> Float[np.ndarray, " s"]:
-    """Return how far along its line the middle of each segment lies from the foot of the robot."""
-    return np.asarray(np.vecdot(segments.ends.mean(axis=1), directions(segments.lines[:, 0])))
+def _faces_cov(
+    segments: Segments, config: StraightnessConfig, edge_m: float, face_m: float
+) -> Float[np.ndarray, "s 2 2"]:
+    fits = segments.cov, segments.chi2, segments.beam_counts, float(config.shared.outlier_sigmas)
+    return faces_cov(segments.lines, segments.ends, *fits, edge_m, face_m)

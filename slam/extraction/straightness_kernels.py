@@ -61,15 +61,26 @@ def misfit_variances(
 def faces_cov(
     lines: Float[np.ndarray, "s 2"],
     ends: Float[np.ndarray, "s 2 2"],
-    misfits_m2: Float[np.ndarray, " s"],
+    cov: Float[np.ndarray, "s 2 2"],
+    chi2: Float[np.ndarray, " s"],
+    beam_counts: Int[np.ndarray, " s"],
+    sigmas: float,
     edge_m: float,
     face_m: float,
 ) -> Float[np.ndarray, "s 2 2"]:
     """Return what the covariances of (alpha, r) of seen lines lack, since some are of several faces."""
-    across, lengths, middles = np.empty(len(lines)), np.empty(len(lines)), np.empty(len(lines))
+    across, lengths = misfit_variances(cov, chi2, beam_counts, sigmas), np.empty(len(lines))
     for k in range(len(lines)):
         lengths[k] = math.hypot(ends[k, 1, 0] - ends[k, 0, 0], ends[k, 1, 1] - ends[k, 0, 1])
-        across[k] = misfits_m2[k] + edge_variance(lengths[k], edge_m, face_m)
+        across[k] += edge_variance(lengths[k], edge_m, face_m)
+    return edge_cov(across, lengths, middles_of(lines, ends))
+
+
+@compiled
+def middles_of(lines: Float[np.ndarray, "s 2"], ends: Float[np.ndarray, "s 2 2"]) -> Float[np.ndarray, " s"]:
+    """Return how far along its line the middle of each segment lies from the foot of the robot."""
+    middles = np.empty(len(lines))
+    for k in range(len(lines)):
         x, y = 0.5 * (ends[k, 0, 0] + ends[k, 1, 0]), 0.5 * (ends[k, 0, 1] + ends[k, 1, 1])
         middles[k] = y * math.cos(lines[k, 0]) - x * math.sin(lines[k, 0])
-    return edge_cov(across, lengths, middles)
+    return middles

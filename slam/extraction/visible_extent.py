@@ -1,7 +1,5 @@
 """How far the ends of what one scan shows can be believed."""
 
-from dataclasses import replace
-
 from ..robot import Scan
 from .config import ExtractionConfig
 from .kernels.extent_kernels import believed_ends
@@ -23,4 +21,5 @@ def sure_pieces(segments: Segments, scan: Scan, config: ExtractionConfig) -> Seg
         float(config.shared.door_m),
         float(config.shared.within_m),
     )
-    return replace(segments, ends=ends, end_kinds=end_kinds)
+    lines, cov, beams, counts = segments.lines, segments.cov, segments.beams, segments.beam_counts
+    return Segments(lines, cov, ends, beams, counts, end_kinds, segments.chi2, segments.is_tentative)

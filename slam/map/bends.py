@@ -23,15 +23,14 @@ def ends_at_bends(
     Only walls within the scanner's range, m, are looked at. Two that may be one line by the chi-square gate at the
     probability level `one_wall` meet nowhere: they are left to be merged. The wall that runs up to the bend is first.
     """
-    near = np.flatnonzero(walls.established & ~walls.tentative & (walls.distances_m < range_m))
-    belief, alpha = walls.belief, walls.belief.means[:, 0].copy()
-    bounds = float(shared.resolution_m), float(shared.sharp_rad)
-    rows, points_world = overlapping(near, alpha, walls.ends_world, *bounds)
+    near = (walls.established & ~walls.tentative & (walls.distances_m < range_m)).nonzero()[0]
+    belief, bounds = walls.belief, (float(shared.resolution_m), float(shared.sharp_rad))
+    rows, points_world = overlapping(near, belief.means, walls.ends_world, *bounds)
     if not len(rows):
         return rows, points_world
     some = np.unique(rows)
     joint = belief.joint(walls.ids[some])
     differ = [not same_line(joint.take(pair), one_wall) for pair in np.searchsorted(some, rows)]
     rows, points_world = rows[differ], points_world[differ]
-    along = np.vecdot(points_world[:, None] - belief.anchors[rows], directions(alpha[rows]))
+    along = np.vecdot(points_world[:, None] - belief.anchors[rows], directions(belief.means[rows, 0]))
     return walls.ids[rows], along

@@ -1,8 +1,8 @@
 """Segments joined end to end: chains, their open ends, closed contours (paper, sections 2 and 2.2)."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 from ..estimation.shared import SharedConfig
 from .kernels.chain_kernels import HEAD as HEAD
 from .kernels.chain_kernels import TAIL as TAIL
-from .kernels.chain_kernels import Reach, corner_points, joinable, near_ends, runs, successors
+from .kernels.chain_kernels import Reach, linked
 from .stochastic_map import StochasticMap
 
 
@@ -54,51 +54,35 @@ def connect(
     Free side on the left throughout, so a head joins only a tail. `set_aside` holds (wall id, side) of ends that
     were looked at closely: two of these may join across a wider gap (a missed short face).
     """
-    rows = np.flatnonzero(~walls.tentative)
+    rows = (~walls.tentative).nonzero()[0]
     if not len(rows):
         return ()
-    ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
-    pairs = near_ends(ends, float(max(shared.thickness_m, shared.door_m)))
-    both_aside = _both_aside(pairs, ids, set_aside)
-    gaps, allowed = joinable(pairs, ends, lines[:, 0].copy(), both_aside, _reach(shared))
-    successor = successors(pairs, gaps, allowed, len(rows))
-    before = np.flatnonzero(successor >= 0)
-    after = successor[before]
-    corners = np.full((len(rows), 2), np.nan)
-    corners[before] = corner_points(
-        lines[before], lines[after], ends[before, HEAD], ends[after, TAIL], float(shared.short_m)
-    )
-    walked, starts, closed = runs(successor)
-    names, corners, ends = ids[walked].tolist(), corners[walked], ends[walked]
-    return tuple(
+    ends, ids, lines = walls.ends_world[rows], walls.ids[rows], (walls.belief.anchors[rows], walls.belief.means[rows])
+    near_m, corner_m = float(max(shared.thickness_m, shared.door_m)), float(shared.short_m)
+    walked, starts, closed, corners = linked(ends, *lines, _aside(ids, set_aside), near_m, corner_m, _reach(shared))
+    names, ends = ids[walked].tolist(), ends[walked]
+    chains = [
         _chain(tuple(names[start:stop]), is_closed, ends[start:stop], corners[start:stop])
         for (start, stop), is_closed in zip(pairwise(starts.tolist()), closed.tolist(), strict=True)
-    )
+    ]
+    return tuple(chains)
 
 
-def _both_aside(
-    pairs: Int[np.ndarray, "k 2"],
-    ids: Int[np.ndarray, " n"],
-    set_aside: Collection[tuple[int, int]],
-) -> Bool[np.ndarray, " k"]:
-    """Return of which pairs (head, tail) both ends were set aside."""
+def _aside(ids: Int[np.ndarray, " n"], set_aside: Collection[tuple[int, int]]) -> Bool[np.ndarray, "n 2"]:
+    """Return which ends of walls were set aside."""
+    aside = np.zeros((len(ids), 2), dtype=bool)
     if not set_aside:
-        return np.zeros(len(pairs), dtype=bool)
-    aside, (named, sides) = np.zeros((len(ids), 2), dtype=bool), np.array(list(set_aside)).T
+        return aside
+    named, sides = np.array(list(set_aside)).T
     rows = np.minimum(np.searchsorted(ids, named), len(ids) - 1)
     there = ids[rows] == named
     aside[rows[there], sides[there]] = True
-    return np.asarray(aside[pairs[:, 0], HEAD] & aside[pairs[:, 1], TAIL])
+    return aside
 
 
-@lru_cache
 def _reach(shared: SharedConfig) -> Reach:
-    return Reach(
-        float(shared.thickness_m),
-        float(shared.door_m),
-        float(np.cos(shared.straight_rad)),
-        float(shared.within_m),
-    )
+    straight_cosine = math.cos(shared.straight_rad)
+    return Reach(float(shared.thickness_m), float(shared.door_m), straight_cosine, float(shared.within_m))
 
 
 def _chain(

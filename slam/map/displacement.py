@@ -12,16 +12,6 @@ from ..geometry.numerics import TINY
 from ..geometry.poses import J
 
 
-def across(
-    ends_world: Float[np.ndarray, "n 2 2"],
-    anchors: Float[np.ndarray, "n 2"],
-    means: Float[np.ndarray, "n 2"],
-) -> Float[np.ndarray, "n 2"]:
-    """Return how far (m) beyond its two ends, along its normal, the line (alpha rad, d m) of each wall lies now."""
-    n = normals(means[:, 0])
-    return means[:, None, 1] - np.einsum("nk,nek->ne", n, ends_world - anchors[:, None])
-
-
 def along(
     middles_world: Float[np.ndarray, "m 2"],
     alpha: Float[np.ndarray, " m"],

@@ -16,9 +16,8 @@ from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..geometry.quantities import Distance, Probability
 from ..robot import RobotSpec, Scan, of_robot
-from .kernels.existence_kernels import Odds, look
-from .kernels.few_beams_kernels import Same, distances, lines_of, paired
-from .kernels.ray_evidence import ray_evidence
+from .kernels.existence_kernels import Odds
+from .kernels.few_beams_kernels import Same, lines_of, looked
 
 JUST_BEGUN = np.full(2, np.nan)
 """The place of the last look at a wall that begins in this scan."""
@@ -104,35 +103,32 @@ class LandmarkCandidates:
         So many beams make a segment.
         """
         self._same = Same(gate_level(gate, 2), float(np.cos(angle_rad)), float(config.slack_m))
-        self._config, self._odds = config, config.few_odds(least_beams)
+        self._config, self._odds, self._believed = config, config.few_odds(least_beams), config.believed
         self._lines, self._places, self._log_odds = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros(0)
 
     def __len__(self) -> int:
         return len(self._lines)
 
     def see(
-        self, pose_world: Float[np.ndarray, "3"], scan: Scan, segments: Segments
+        self, pose_world: Float[np.ndarray, "3"], scan: Scan, segments: Segments, few: Int[np.ndarray, " f"]
     ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
-        """Take in one scan, of which `segments` have few beams and lie on no wall.
+        """Take in one scan, of which these `few` segments have few beams and lie on no wall.
 
         Returns those to be believed now, and the log odds that they are walls. A line keeps its first observation, so
         that it does not wander off step by step.
         """
-        lines, known = lines_of(pose_world, segments.lines, segments.cov, segments.ends), self._lines
-        line_of = paired(distances(lines, known, self._same))
-        anchors, alpha_rad, half_m = known[:, 1:3].copy(), known[:, 0], known[:, 5:]
-        rays = ray_evidence(scan, pose_world, anchors, np.column_stack([alpha_rad, np.zeros(len(known))]))
-        beams = rays.reaching(half_m * [-1.0, 1.0], self._odds.margin_m)
-        seen = np.isin(np.arange(len(known)), line_of)
-        look(pose_world, beams, seen, self._log_odds, self._places, self._odds)
-        due = self._log_odds > self._config.believed
-        believed = np.flatnonzero((line_of >= 0) & due[line_of]) if len(known) else np.zeros(0, dtype=np.int64)
+        lines = lines_of(pose_world, segments.lines[few], segments.cov[few], segments.ends[few])
+        known, rays = self._lines, (pose_world, scan.bearings_rad, scan.passed_m)
+        line_of = looked(*rays, lines, known, self._log_odds, self._places, self._same, self._odds)
+        due = self._log_odds > self._believed
+        believed = (line_of >= 0).nonzero()[0]
+        believed = believed[due[line_of[believed]]]
         log_odds = self._log_odds[line_of[believed]]
         kept = ~due & (self._log_odds >= 0.0)
-        fresh = np.flatnonzero(line_of < 0)
+        fresh = (line_of < 0).nonzero()[0]
         if len(fresh) or not kept.all():
             self._lines = np.concatenate([known[kept], lines[fresh]])
             self._places = np.concatenate([self._places[kept], np.tile(NOWHERE, (len(fresh), 1))])
-            begun = self._config.begins(segments.is_tentative[fresh])
+            begun = self._config.begins(segments.is_tentative[few[fresh]])
             self._log_odds = np.concatenate([self._log_odds[kept], begun])
-        return believed, log_odds
+        return few[believed], log_odds

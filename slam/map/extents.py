@@ -10,12 +10,11 @@ from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..robot import Scan
-from .displacement import across, along
+from .displacement import along
 from .existence import JUST_BEGUN, ExistenceConfig
 from .kernels import wall_kernels
 from .kernels.existence_kernels import look
-from .kernels.extent_kernels import cut_back, take_in
-from .kernels.ray_evidence import RayEvidence, ray_evidence
+from .kernels.extent_kernels import contradict, take_in
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
 from .stochastic_map import StochasticMap
@@ -50,7 +49,7 @@ class Extents:
     def __init__(self, config: WallsConfig, records: Records, sure_beams: int) -> None:
         """Keep the extents in these records; `sure_beams` are those of a sure segment."""
         self._config = config
-        self._odds = config.existence.odds(sure_beams)
+        self._odds, self._believed = config.existence.odds(sure_beams), config.existence.believed
         self._records = records
         self._records.declare(
             self._merge,
@@ -60,29 +59,22 @@ class Extents:
             observations=0,
             against=0,
             whole=0,
-            log_odds=config.existence.believed,
+            log_odds=self._believed,
             place=JUST_BEGUN,
         )
 
     def follow(self, belief: Belief) -> None:
         """Move extents along with the map, where long walls have moved by more than ends are known to."""
         columns, shared = self._records.columns, self._config.shared
-        rows = self._records.rows(belief.ids)
-        placed, extents = columns["placed"][rows], columns["extents"][rows]
-        begun = np.isnan(placed[:, 0])
-        placed[begun] = belief.means[begun]
-        columns["placed"][rows] = placed
-        tell = np.flatnonzero(extents[:, 1] - extents[:, 0] >= shared.long_m)
-        anchors = belief.anchors[tell]
-        ends_world = wall_kernels.ends_world(anchors, placed[tell], extents[tell])
-        moved_m = across(ends_world, anchors, belief.means[tell])
+        self._records.rows(belief.ids)
+        placed, extents, long_m = columns["placed"], columns["extents"], float(shared.long_m)
+        tell, ends_world, moved_m = wall_kernels.moved(placed, extents, belief.anchors, belief.means, long_m)
         if not len(tell) or np.abs(moved_m).max() <= shared.resolution_m:
             return
         seen = np.flatnonzero(extents[:, 0] <= extents[:, 1])
         middles = wall_kernels.ends_world(belief.anchors[seen], placed[seen], extents[seen]).mean(axis=1)
-        told = ends_world, placed[tell, 0], moved_m
-        columns["extents"][rows[seen]] += along(middles, placed[seen, 0], *told, float(shared.long_m))[:, None]
-        columns["placed"][rows] = belief.means
+        extents[seen] += along(middles, placed[seen, 0], ends_world, placed[tell, 0], moved_m, long_m)[:, None]
+        placed[:] = belief.means
 
     def map(
         self,
@@ -91,10 +83,10 @@ class Extents:
         off_line_cov: Float[np.ndarray, "n 2 2"] | None = None,
     ) -> StochasticMap:
         """Return the belief together with the extents, and how far walls may be from their lines."""
-        extents, observations = (self._records.columns[name] for name in ("extents", "observations"))
-        tentative = self._records.columns["log_odds"] <= self._config.existence.believed
-        whole = self._records.columns["whole"] >= self._config.shared.scans
-        return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked, whole, off_line_cov)
+        columns = self._records.columns
+        extents, observations = columns["extents"].copy(), columns["observations"].copy()
+        tentative, whole = columns["log_odds"] <= self._believed, columns["whole"] >= self._config.shared.scans
+        return StochasticMap(belief, extents, observations, tentative, crooked, whole, off_line_cov)
 
     def meet(self, pairs: Int[np.ndarray, "k 2"], along: Float[np.ndarray, "k 2"]) -> None:
         """End the walls of each pair of ids, the one before the other, so far along each, m, where they reach past.
@@ -114,47 +106,34 @@ class Extents:
         belief: Belief,
         scan: Scan,
         segments: Segments,
-        owners: Int[np.ndarray, " s"],
+        rows: Int[np.ndarray, " s"],
         begun: Mapping[int, float] = NO_ODDS,
         ambiguous: Int[np.ndarray, " a"] = NOBODY,
     ) -> Int[np.ndarray, " f"]:
         """Stretch the walls over the segments that they own, and return ids of walls not worth keeping.
 
-        `begun` holds ids of walls that begin more likely than others, and their log odds; the scan may show
-        `ambiguous` ones, too.
+        `rows` holds the row of each segment's wall, -1 for none, and `begun` ids of walls that begin more likely than
+        others, and their log odds; the scan may show `ambiguous` ones, too.
         """
-        used = np.flatnonzero(owners >= 0)
-        rows = self._records.rows(owners[used])
-        columns, shared = self._records.columns, self._config.shared
-        extents, lines = columns["extents"], (belief.pose_world, belief.anchors, belief.means)
-        seen = segments.ends[used], segments.lines[used], segments.end_kinds[used], rows
-        kept = extents, columns["spacing"], columns["whole"]
-        take_in(*seen, *lines, scan.step_rad, *kept, float(shared.thickness_m))
-        columns["observations"][rows] += 1  # of a wall with two segments, too, by one: summed before it is stored
+        columns, shared, margin_m = self._records.columns, self._config.shared, float(self._config.shared.thickness_m)
+        extents, spacing, log_odds = columns["extents"], columns["spacing"], columns["log_odds"]
+        seen, lines = (segments.ends, segments.lines, segments.end_kinds, rows), (belief.anchors, belief.means)
+        kept = extents, spacing, columns["whole"], columns["observations"]
+        shown = take_in(*seen, belief.pose_world, *lines, scan.step_rad, *kept, margin_m)
         beams = np.zeros(len(extents), dtype=np.int64)
         if self._config.housekeeping:
-            ends_world = wall_kernels.ends_world(belief.anchors, belief.means, extents)
-            near = np.flatnonzero(wall_kernels.distances(belief.pose_world[:2], ends_world) < scan.range_max_m)
-            rays = ray_evidence(scan, belief.pose_world, belief.anchors[near], belief.means[near])
-            beams[near] = rays.reaching(extents[near], self._odds.margin_m)
-            beams[np.isin(self._records.ids, ambiguous)] = 0
-            self._cut_back(rays, near)
-        shown, log_odds = np.isin(self._records.ids, owners), columns["log_odds"]
+            rays = scan.bearings_rad, scan.ranges_m, scan.passed_m, float(scan.range_max_m), belief.pose_world, *lines
+            rules = self._odds.margin_m, margin_m, float(shared.far_m), shared.scans
+            beams = contradict(*rays, extents, spacing, columns["against"], *rules)
+            if len(ambiguous):
+                beams[np.isin(self._records.ids, ambiguous)] = 0
         look(belief.pose_world, beams, shown, log_odds, columns["place"], self._odds)
-        begins = self._records.rows(np.array(list(begun), dtype=np.int64))
-        log_odds[begins] = np.maximum(log_odds[begins], list(begun.values()))
+        if begun:
+            begins = self._records.rows(np.array(list(begun), dtype=np.int64))
+            log_odds[begins] = np.maximum(log_odds[begins], list(begun.values()))
         if not self._config.housekeeping:
             return NOBODY
         return self._records.ids[(log_odds < 0.0) | (extents[:, 1] - extents[:, 0] < shared.resolution_m)]
-
-    def _cut_back(self, rays: RayEvidence, near: Int[np.ndarray, " m"]) -> None:
-        """Cut walls back where beams pass through them."""
-        columns, shared = self._records.columns, self._config.shared
-        margin_m = float(shared.thickness_m)
-        seen = near, rays.along, rays.hits(margin_m), rays.passes(margin_m)
-        cut_back(
-            *seen, columns["extents"], columns["spacing"], columns["against"], margin_m, shared.far_m, shared.scans
-        )
 
     def _merge(self, merger: Merger) -> None:
         """Give the kept wall the extent of both."""

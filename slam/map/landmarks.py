@@ -8,10 +8,10 @@ from jaxtyping import Float, Int
 
 from ..estimation.backend import Belief
 from ..extraction.segments import Segments
-from ..extraction.straightness import cov_of_breaks
 from ..geometry.lines import directions
 from ..robot import Scan
 from .extents import NO_ODDS, NOBODY, Extents, WallsConfig
+from .kernels.reliability_kernels import lack_of_fit
 from .profiles import Profiles
 from .records import Records
 from .reliability import Reliability
@@ -40,15 +40,13 @@ class Landmarks:
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""
-        ids, extents = self.records.ids, self.records.columns["extents"]
-        cov = self.reliability.off_line_cov(ids, extents, *self.profiles.misfits(ids, extents))
-        return self.extents.map(belief, self.profiles.crooked(ids, extents), cov)
+        columns = self.records.columns
+        return self.extents.map(belief, *self.reliability.off_line_cov(columns["extents"], columns["broken"]))
 
     def lack_of_fit(self, segments: Segments, owners: Int[np.ndarray, " s"]) -> Float[np.ndarray, "s 2 2"]:
         """Return how far the face that each segment shows may be from the line of its wall, of (alpha rad, r m)."""
-        extents = self.records.columns["extents"][self.records.rows(owners)]
-        misfits_m2, drawn = self.profiles.misfits(owners, extents)
-        return cov_of_breaks(segments, misfits_m2, drawn[:, 1] - drawn[:, 0])
+        rows, columns = self.records.rows(owners), self.records.columns
+        return lack_of_fit(segments.lines, segments.ends, columns["broken"][rows], columns["extents"][rows])
 
     def observe(
         self,
@@ -65,9 +63,10 @@ class Landmarks:
         `ambiguous` ones, too.
         """
         self.records.rows(belief.ids)
-        self.reliability.see(segments, owners)
-        self.profiles.see(belief, scan, segments, owners)
-        forgotten = self.extents.see(belief, scan, segments, owners, begun, ambiguous)
+        rows = self.records.rows(owners)
+        self.reliability.see(segments, rows)
+        self.profiles.see(belief, scan, segments, rows)
+        forgotten = self.extents.see(belief, scan, segments, rows, begun, ambiguous)
         if not len(forgotten):
             return Observed(owners, forgotten)
         self.records.remove(forgotten)

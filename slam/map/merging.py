@@ -4,7 +4,7 @@ Where one landmark would hide the other from every beam, no covariance is asked:
 surer of the millimetres between the two than it has a right to be, and would keep both for good.
 """
 
-from collections.abc import Collection
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,11 +38,11 @@ class MergingConfig:
 
 def duplicate_of(
     walls: StochasticMap,
-    touched: Collection[int],
+    touched: Int[np.ndarray, " t"],
     one_wall: float,
     config: MergingConfig = MergingConfig(),
 ) -> tuple[int, int] | None:
-    """Return the ids (older, younger) of two landmarks of one wall, one of them among `touched`, or None.
+    """Return the ids (older, younger) of two landmarks of one wall, one of them among `touched` ids, or None.
 
     `one_wall` is the probability level of the chi-square gate on the difference of the two lines.
 
@@ -63,18 +63,15 @@ def duplicate_of(
 
 
 def lying_along(
-    walls: StochasticMap, touched: Collection[int], config: MergingConfig
+    walls: StochasticMap, touched: Int[np.ndarray, " t"], config: MergingConfig
 ) -> tuple[Int[np.ndarray, "p 2"], Bool[np.ndarray, " p"]]:
     """Return the pairs of ids (older first) of trusted walls on one side that lie along each other, by position.
 
     And of which pairs the one hides the other.
     """
-    lengths, alpha = walls.extents[:, 1] - walls.extents[:, 0], walls.belief.means[:, 0].copy()
-    ours, trusted = np.array(sorted(touched), dtype=np.int64), ~walls.tentative
-    turn_cosine, across_m = float(np.cos(config.shared.straight_rad)), float(config.shared.resolution_m)
-    pairs, beside = merging_kernels.lying_along(
-        walls.ids, ours, trusted, alpha, walls.ends_world, lengths, turn_cosine, across_m
-    )
+    known = walls.ids, touched, walls.tentative, walls.belief.means, walls.ends_world, walls.extents
+    turn_cosine, across_m = math.cos(config.shared.straight_rad), float(config.shared.resolution_m)
+    pairs, beside = merging_kernels.lying_along(*known, turn_cosine, across_m)
     length, across, overlap = beside.T
     hidden = (across <= config.hidden_m) & (np.minimum(length, overlap) >= config.shared.long_m)
     return walls.ids[pairs], hidden

@@ -7,17 +7,16 @@ offset and slope, in which the errors of both are, are eliminated, and what the 
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig
 from ..extraction.segments import Segments
-from ..geometry.line_kernels import lines_from
-from ..geometry.lines import directions
 from ..robot import Scan
-from .kernels.profile_kernels import beams_on_lines, breaks_of_beams, misfits, places_between, surest
+from .kernels.profile_kernels import breaks_of_scan, keep_surest
 from .records import Merger, Records
 
 Sums = Float[np.ndarray, "5 p"]
@@ -39,58 +38,26 @@ class Profiles:
         # and from where to where beams fell, m.
         self._records.declare(self._merge, profile=None, broken=np.zeros(5))
 
-    def see(self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
-        """Add one scan; `owners` holds the wall of each segment, -1 for none."""
-        seen = np.flatnonzero(owners >= 0)
-        walls, of = np.unique(owners[seen], return_inverse=True)
-        rows = belief.rows(walls)
-        lines, feet = lines_from(belief.pose_world, belief.anchors[rows], belief.means[rows])
-        middles = segments.ends[seen].mean(axis=1)
-        order = np.lexsort((np.vecdot(middles, directions(lines[of, 0])), of))
-        seen, of = seen[order], of[order]
+    def see(self, belief: Belief, scan: Scan, segments: Segments, rows: Int[np.ndarray, " s"]) -> None:
+        """Add one scan; `rows` holds the row of each segment's wall, -1 for none."""
+        seen = segments.beams, segments.lines, segments.ends, rows, belief.pose_world, belief.anchors, belief.means
         beams = scan.bearings_rad, scan.ranges_m, np.ascontiguousarray(scan.sigmas_m)
-        looks = segments.beams[seen], segments.lines[seen], of, lines, feet
-        met = beams_on_lines(*looks, *beams, float(self._shared.noise_sigmas))
-        place, place_of = places_between(met[0], met[3], self._pitch_m)
-        sums = breaks_of_beams(*met, self._pitch_m * place, place_of)
-        bounds = np.searchsorted(place_of, np.arange(len(walls) + 1)).tolist()
-        for k, row in enumerate(self._records.rows(walls).tolist()):
-            if bounds[k] < bounds[k + 1]:
-                self._add(row, int(place[bounds[k]]), sums[:, bounds[k] : bounds[k + 1]])
+        place, place_of, sums = breaks_of_scan(*seen, *beams, float(self._shared.noise_sigmas), self._pitch_m)
+        bounds = [0, *((place_of[1:] != place_of[:-1]).nonzero()[0] + 1).tolist(), len(place)]
+        for start, stop in pairwise(bounds if len(place) else ()):
+            self._add(int(place_of[start]), int(place[start]), sums[:, start:stop])
 
     def _add(self, row: int, first: int, more: Sums) -> None:
         """Add to a wall's sums from its place `first` on."""
         columns = self._records.columns
         begin, sums = columns["profile"][row] or (first, more[:, :0])
-        before, after = max(begin - first, 0), max(first + more.shape[1] - begin - sums.shape[1], 0)
-        if before or after:
-            begin, sums = begin - before, np.pad(sums, ((0, 0), (before, after)))
+        before, after = begin - first, first + more.shape[1] - begin - sums.shape[1]
+        if before > 0 or after > 0:
+            none = np.zeros((5, max(before, 0))), np.zeros((5, max(after, 0)))
+            begin, sums = min(begin, first), np.concatenate([none[0], sums, none[1]], axis=1)
+            columns["profile"][row] = begin, sums
         sums[:, first - begin : first - begin + more.shape[1]] += more
-        at, step_m, turn_rad, ratio = surest(sums, self._least_ratio)
-        columns["profile"][row] = begin, sums
-        columns["broken"][row] = 0.0
-        if ratio > self._least_ratio:
-            places = self._pitch_m * np.array([begin + at, begin, begin + sums.shape[1] - 1])
-            columns["broken"][row] = places[0], step_m, turn_rad, places[1], places[2]
-
-    def misfits(
-        self, ids: Int[np.ndarray, " n"], extents: Float[np.ndarray, "n 2"]
-    ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 2"]]:
-        """Return how far the faces of walls are off their lines, as variances across these, m^2, and over what.
-
-        `extents` are from and to along each, m from its anchor. What beams have shown beyond them drew the line, too: a
-        wall that ends at its bend now was seen past it before.
-        """
-        broken = self._records.columns["broken"][self._records.rows(ids)]
-        low, high = np.minimum(extents[:, 0], broken[:, 3]), np.maximum(extents[:, 1], broken[:, 4])
-        drawn = np.stack([low, high], axis=-1)
-        return misfits(broken[:, :3].copy(), drawn), drawn
-
-    def crooked(self, ids: Int[np.ndarray, " n"], extents: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
-        """Return which walls have a break between their ends: they stand for two faces."""
-        broken = self._records.columns["broken"][self._records.rows(ids)]
-        is_broken = np.any(broken[:, 1:3] != 0.0, axis=-1)
-        return is_broken & (extents[:, 0] < broken[:, 0]) & (broken[:, 0] < extents[:, 1])
+        keep_surest(sums, begin, self._pitch_m, self._least_ratio, columns["broken"][row])
 
     def _merge(self, merger: Merger) -> None:
         """Add the sums of the dropped wall at the nearest places of the kept one: half a pitch off at most."""

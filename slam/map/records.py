@@ -47,10 +47,10 @@ class Records:
             self._mergers.append(merge)
 
     def rows(self, ids: Int[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
-        """Return the rows of walls; those that have none yet begin theirs."""
+        """Return the rows of walls, -1 for -1 (none); those that have none yet begin theirs."""
         rows, all_known = rows_of(self.ids, ids)
         if not all_known:
-            self._begin(np.setdiff1d(ids, self.ids))
+            self._begin(np.setdiff1d(ids[ids >= 0], self.ids))
             rows, _ = rows_of(self.ids, ids)
         return rows
 

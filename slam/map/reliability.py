@@ -63,12 +63,9 @@ class Reliability:
             longest=np.zeros(2),
         )
 
-    def see(self, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
-        """Add one scan; `owners` holds the wall of each segment, -1 for none."""
-        used = (owners >= 0) & (segments.cov[:, 0, 0] > 0.0)
-        seen = segments.take(used)
-        rows, columns = self._records.rows(owners[used]), self._records.columns
-        add_lengths(rows, seen.ends, columns["longest"])
+    def see(self, segments: Segments, rows: Int[np.ndarray, " s"]) -> None:
+        """Add one scan; `rows` holds the row of each segment's wall, -1 for none."""
+        add_lengths(rows, segments.cov, segments.ends, self._records.columns["longest"])
 
     def _merge(self, merger: Merger) -> None:
         """Add what was seen of the dropped wall to the kept one's."""
@@ -77,18 +74,13 @@ class Reliability:
             keep_longest(longest[merger.keep], length)
 
     def off_line_cov(
-        self,
-        ids: Int[np.ndarray, " n"],
-        extents: Float[np.ndarray, "n 2"],
-        misfits_m2: Float[np.ndarray, " n"],
-        drawn: Float[np.ndarray, "n 2"],
-    ) -> Float[np.ndarray, "n 2 2"]:
-        """Return how far walls of such extents, m along their lines, may be from them, of (alpha rad, d m).
+        self, extents: Float[np.ndarray, "n 2"], broken: Float[np.ndarray, "n 5"]
+    ) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 2 2"]]:
+        """Return which walls stand for two faces, and how far all may be from their lines, of (alpha rad, d m).
 
-        Their misfits are those of lines over what was `drawn`, from and to, m.
+        Walls have such extents, m along their lines, and such likeliest breaks (`Profiles`).
         What one scan alone shows of a wall, longer than any other, may be of two faces: a short one and another behind
         it. So a wall counts as long as two scans saw it.
         """
-        longest = self._records.columns["longest"][self._records.rows(ids)]
         edges = float(self._config.edge_m), float(self._config.shared.face_m)
-        return reliability_kernels.off_line_cov(extents, longest, misfits_m2, drawn, *edges)
+        return reliability_kernels.off_lines(extents, self._records.columns["longest"], broken, *edges)

@@ -11,7 +11,7 @@ from ...geometry.compiled import compiled
 @compiled
 def overlapping(
     rows: Int[np.ndarray, " k"],
-    alpha: Float[np.ndarray, " n"],
+    means: Float[np.ndarray, "n 2"],
     ends: Float[np.ndarray, "n 2 2"],
     resolution_m: float,
     most_rad: float,
@@ -21,6 +21,7 @@ def overlapping(
     They overlap by more than ends are uncertain, neither beside the whole of the other, and turn by less than
     `most_rad`: there one face would hide the other past the crossing.
     """
+    alpha = means[:, 0]
     pairs, points, count = np.empty((8, 2), np.int64), np.empty((8, 2)), 0
     for before in rows:
         tx, ty = -math.sin(alpha[before]), math.cos(alpha[before])

@@ -30,6 +30,38 @@ class Reach(NamedTuple):
 
 
 @compiled
+def linked(
+    ends: Float[np.ndarray, "n 2 2"],
+    anchors: Float[np.ndarray, "n 2"],
+    means: Float[np.ndarray, "n 2"],
+    aside: Bool[np.ndarray, "n 2"],
+    near_m: float,
+    corner_m: float,
+    reach: Reach,
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " c"], Bool[np.ndarray, " r"], Float[np.ndarray, "n 2"]]:
+    """Return the `runs` of walls that are joined, and where each of them meets the next, of which ends are set aside.
+
+    Only ends within `near_m` are looked at; of two walls the lines cross within `corner_m` of both ends, or the corner
+    is amid these.
+    """
+    pairs = near_ends(ends, near_m)
+    both_aside = np.zeros(len(pairs), np.bool_)
+    for k in range(len(pairs)):
+        both_aside[k] = aside[pairs[k, 0], HEAD] and aside[pairs[k, 1], TAIL]
+    alpha, lines = means[:, 0].copy(), means.copy()
+    lines[:, 1] += np.cos(alpha) * anchors[:, 0] + np.sin(alpha) * anchors[:, 1]
+    gaps, allowed = joinable(pairs, ends, alpha, both_aside, reach)
+    successor = successors(pairs, gaps, allowed, len(ends))
+    before = np.flatnonzero(successor >= 0)
+    after = successor[before]
+    heads, tails = ends[:, HEAD].copy()[before], ends[:, TAIL].copy()[after]
+    corners = np.full((len(ends), 2), np.nan)
+    corners[before] = corner_points(lines[before], lines[after], heads, tails, corner_m)
+    walked, starts, closed = runs(successor)
+    return walked, starts, closed, corners[walked]
+
+
+@compiled
 def near_ends(ends: Float[np.ndarray, "n 2 2"], reach_m: float) -> Int[np.ndarray, "k 2"]:
     """Return the pairs (head of one, tail of another) that are as near, ascending."""
     n = len(ends)

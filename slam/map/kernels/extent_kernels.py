@@ -9,6 +9,8 @@ from ...extraction.segments import EndKind
 from ...geometry.compiled import compiled
 from ...geometry.line_kernels import GRAZING
 from ...geometry.numerics import TINY
+from .ray_kernels import crossings, reaching
+from .wall_kernels import distances, ends_world
 
 CORNER, OCCLUDED = int(EndKind.CORNER), int(EndKind.OCCLUDED)
 
@@ -37,10 +39,15 @@ def seen_along(
     means: Float[np.ndarray, "n 2"],
     step_rad: float,
 ) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2"]]:
-    """Return where the ends of segments lie along their walls, m, and how far beams stand apart there."""
+    """Return where the ends of segments lie along their walls, m, and how far beams stand apart there.
+
+    `rows` holds the row of each segment's wall, -1 for none.
+    """
     along, apart = np.empty((len(rows), 2)), np.empty((len(rows), 2))
     for k in range(len(rows)):
         row = rows[k]
+        if row < 0:
+            continue
         for side in range(2):
             along[k, side] = _along(ends[k, side], pose_world, anchors[row], means[row, 0])
             distance = math.hypot(ends[k, side, 0], ends[k, side, 1])
@@ -63,6 +70,8 @@ def stretch(
         outward = -1.0 if side == 0 else 1.0
         for k in range(len(rows)):
             row = rows[k]
+            if row < 0:
+                continue
             beyond = outward * (along[k, side] - extents[row, side])
             sharper = end_kinds[k, side] == CORNER and apart[k, side] < spacing[row, side]
             if beyond > 0.0 or (sharper and -beyond < spacing[row, side]):
@@ -82,10 +91,11 @@ def note_whole(
     """Count in how many scans nothing hid either end of a wall, since it last turned out to be longer."""
     for k in range(len(rows)):
         row = rows[k]
-        if abs(extents[row, 0] - before[row, 0]) > margin_m or abs(extents[row, 1] - before[row, 1]) > margin_m:
+        grown = abs(extents[row, 0] - before[row, 0]) > margin_m or abs(extents[row, 1] - before[row, 1]) > margin_m
+        if row >= 0 and grown:
             whole[row] = 0
     for k in range(len(rows)):
-        if end_kinds[k, 0] != OCCLUDED and end_kinds[k, 1] != OCCLUDED:
+        if rows[k] >= 0 and end_kinds[k, 0] != OCCLUDED and end_kinds[k, 1] != OCCLUDED:
             whole[rows[k]] += 1
 
 
@@ -93,8 +103,8 @@ def note_whole(
 def cut_back(
     near: Int[np.ndarray, " n"],
     along: Float[np.ndarray, "n k"],
-    hits: Bool[np.ndarray, "n k"],
-    passes: Bool[np.ndarray, "n k"],
+    across: Float[np.ndarray, "n k"],
+    ranges_m: Float[np.ndarray, " k"],
     extents: Float[np.ndarray, "w 2"],
     spacing: Float[np.ndarray, "w 2"],
     against: Int[np.ndarray, " w"],
@@ -110,9 +120,11 @@ def cut_back(
         apart_m = min(margin_m, 0.25 * (extents[row, 1] - extents[row, 0]))
         for beam in range(len(inside)):
             inside[beam] = extents[row, 0] + apart_m < along[k, beam] < extents[row, 1] - apart_m
-        against[row] = against[row] + 1 if np.any(passes[k] & inside) else 0
+        passes = inside & (across[k] > margin_m)
+        against[row] = against[row] + 1 if np.any(passes) else 0
         if against[row] >= twice:
-            kept = kept_piece(extents[row], along[k][passes[k] & inside], along[k][hits[k] & inside], trim_m)
+            hits = inside & np.isfinite(ranges_m) & (np.abs(across[k]) <= margin_m)
+            kept = kept_piece(extents[row], along[k][passes], along[k][hits], trim_m)
             for side in range(2):
                 if kept[side] != extents[row, side]:
                     extents[row, side], spacing[row, side] = kept[side], margin_m
@@ -162,10 +174,43 @@ def take_in(
     extents: Float[np.ndarray, "n 2"],
     spacing: Float[np.ndarray, "n 2"],
     whole: Int[np.ndarray, " n"],
+    observations: Int[np.ndarray, " n"],
     margin_m: float,
-) -> None:
-    """Stretch the walls in `rows` over the segments of one scan, and note which are whole."""
+) -> Bool[np.ndarray, " n"]:
+    """Stretch the walls in `rows` over the segments of one scan, note which are whole, and return which it shows."""
     before = extents.copy()
     along, apart = seen_along(ends, lines, rows, pose_world, anchors, means, step_rad)
     stretch(rows, along, apart, end_kinds, extents, spacing)
     note_whole(before, rows, end_kinds, extents, whole, margin_m)
+    shown = np.zeros(len(extents), np.bool_)
+    for row in rows:
+        if row >= 0:
+            shown[row] = True
+    observations += shown
+    return shown
+
+
+@compiled
+def contradict(
+    bearings_rad: Float[np.ndarray, " k"],
+    ranges_m: Float[np.ndarray, " k"],
+    passed_m: Float[np.ndarray, " k"],
+    range_max_m: float,
+    pose_world: Float[np.ndarray, "3"],
+    anchors: Float[np.ndarray, "w 2"],
+    means: Float[np.ndarray, "w 2"],
+    extents: Float[np.ndarray, "w 2"],
+    spacing: Float[np.ndarray, "w 2"],
+    against: Int[np.ndarray, " w"],
+    reach_m: float,
+    margin_m: float,
+    trim_m: float,
+    twice: int,
+) -> Int[np.ndarray, " w"]:
+    """Cut back the walls within range; return how many beams reach each, as far as it went before."""
+    near = np.flatnonzero(distances(pose_world[:2], ends_world(anchors, means, extents)) < range_max_m)
+    along, across = crossings(bearings_rad, passed_m, pose_world, anchors[near], means[near])
+    beams = np.zeros(len(extents), np.int64)
+    beams[near] = reaching(along, across, extents[near], reach_m)
+    cut_back(near, along, across, ranges_m, extents, spacing, against, margin_m, trim_m, twice)
+    return beams

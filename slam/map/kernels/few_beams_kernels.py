@@ -8,6 +8,8 @@ from jaxtyping import Float, Int
 
 from ...geometry.compiled import compiled
 from ...geometry.matrix_kernels import squared_distance, wrapped
+from .existence_kernels import Odds, look
+from .ray_kernels import crossings, reaching
 
 Lines = Float[np.ndarray, "n 6"]
 """Lines about the middles of their seen pieces, world frame: alpha, middle x and y, variance of alpha, variance of the
@@ -21,6 +23,30 @@ class Same(NamedTuple):
     least_cosine: float
     slack_m: float
     """What the pose may have drifted between the two, sigma."""
+
+
+@compiled
+def looked(
+    pose_world: Float[np.ndarray, "3"],
+    bearings_rad: Float[np.ndarray, " k"],
+    passed_m: Float[np.ndarray, " k"],
+    seen: Float[np.ndarray, "s 6"],
+    known: Lines,
+    log_odds: Float[np.ndarray, " n"],
+    places: Float[np.ndarray, "n 2"],
+    same: Same,
+    odds: Odds,
+) -> Int[np.ndarray, " s"]:
+    """Take one scan into the log odds of known lines, in place; return which of them each seen line is, -1 for none."""
+    line_of = paired(distances(seen, known, same))
+    means, extents, is_seen = np.zeros((len(known), 2)), np.empty((len(known), 2)), np.zeros(len(known), np.bool_)
+    means[:, 0], extents[:, 0], extents[:, 1] = known[:, 0], -known[:, 5], known[:, 5]
+    along, across = crossings(bearings_rad, passed_m, pose_world, known[:, 1:3].copy(), means)
+    for line in line_of:
+        if line >= 0:
+            is_seen[line] = True
+    look(pose_world, reaching(along, across, extents, odds.margin_m), is_seen, log_odds, places, odds)
+    return line_of
 
 
 @compiled

@@ -12,10 +12,10 @@ from ...geometry.compiled import compiled
 def lying_along(
     ids: Int[np.ndarray, " n"],
     touched: Int[np.ndarray, " m"],
-    trusted: Bool[np.ndarray, " n"],
-    alpha: Float[np.ndarray, " n"],
+    tentative: Bool[np.ndarray, " n"],
+    means: Float[np.ndarray, "n 2"],
     ends: Float[np.ndarray, "n 2 2"],
-    lengths: Float[np.ndarray, " n"],
+    extents: Float[np.ndarray, "n 2"],
     turn_cosine: float,
     across_m: float,
 ) -> tuple[Int[np.ndarray, "p 2"], Float[np.ndarray, "p 3"]]:
@@ -23,7 +23,7 @@ def lying_along(
 
     And the length of the shorter of each two, how far it lies across the longer, and by how much they overlap, m.
     """
-    n = len(alpha)
+    n, alpha, lengths = len(means), means[:, 0], extents[:, 1] - extents[:, 0]
     is_ours = np.zeros(n, np.bool_)
     for wall in touched:
         row = np.searchsorted(ids, wall)
@@ -33,7 +33,7 @@ def lying_along(
     pairs, beside, count = np.empty((8, 2), np.int64), np.empty((8, 3)), 0
     for older in range(n):
         for younger in everyone[older + 1 :] if is_ours[older] else ours:
-            if younger <= older or not (trusted[older] and trusted[younger]):
+            if younger <= older or tentative[older] or tentative[younger]:
                 continue
             # Circles around two walls that lie along each other meet: this leaves few pairs to look at.
             x = 0.5 * (ends[older, 0, 0] + ends[older, 1, 0] - ends[younger, 0, 0] - ends[younger, 1, 0])

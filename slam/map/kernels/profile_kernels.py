@@ -3,9 +3,10 @@
 import math
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ...geometry.compiled import compiled
+from ...geometry.line_kernels import lines_from
 from ...geometry.numerics import TINY
 
 LEAST_BEAMS = 2
@@ -15,12 +16,61 @@ SAME = 1e-6
 
 
 @compiled
+def breaks_of_scan(
+    runs: Int[np.ndarray, "s 2"],
+    seen: Float[np.ndarray, "s 2"],
+    ends: Float[np.ndarray, "s 2 2"],
+    rows: Int[np.ndarray, " s"],
+    pose_world: Float[np.ndarray, "3"],
+    anchors: Float[np.ndarray, "n 2"],
+    means: Float[np.ndarray, "n 2"],
+    bearings_rad: Float[np.ndarray, " b"],
+    ranges_m: Float[np.ndarray, " b"],
+    sigmas_m: Float[np.ndarray, " b"],
+    gate_sigmas: float,
+    pitch_m: float,
+) -> tuple[Int[np.ndarray, " p"], Int[np.ndarray, " p"], Float[np.ndarray, "5 p"]]:
+    """Return places along the walls that a scan shows, in pitches, whose they are, and what its beams say of breaks.
+
+    `rows` holds the row of each segment's wall, -1 for none.
+    """
+    order = walked(ends, rows, pose_world[2], means)
+    wall_of = rows[order]
+    lines, feet = lines_from(pose_world, anchors[wall_of], means[wall_of])
+    beams = bearings_rad, ranges_m, sigmas_m
+    along, across, sigma, of = beams_on_lines(runs[order], seen[order], wall_of, lines, feet, *beams, gate_sigmas)
+    place, place_of = places_between(along, of, pitch_m)
+    return place, place_of, breaks_of_beams(along, across, sigma, of, pitch_m * place, place_of)
+
+
+@compiled
+def walked(
+    ends: Float[np.ndarray, "s 2 2"], rows: Int[np.ndarray, " s"], heading_rad: float, means: Float[np.ndarray, "n 2"]
+) -> Int[np.ndarray, " m"]:
+    """Return the segments that are of walls, wall by wall in ascending order, each wall's in the order of a walk."""
+    order, along, count = np.empty(len(rows), np.int64), np.empty(len(rows)), 0
+    for k in range(len(rows)):
+        if rows[k] < 0:
+            continue
+        alpha = means[rows[k], 0] - heading_rad
+        x, y = 0.5 * (ends[k, 0, 0] + ends[k, 1, 0]), 0.5 * (ends[k, 0, 1] + ends[k, 1, 1])
+        along[k] = y * math.cos(alpha) - x * math.sin(alpha)
+        place = count
+        while place > 0 and (rows[order[place - 1]], along[order[place - 1]]) > (rows[k], along[k]):
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = k
+        count += 1
+    return order[:count].copy()
+
+
+@compiled
 def beams_on_lines(
     runs: Int[np.ndarray, "m 2"],
     seen: Float[np.ndarray, "m 2"],
     wall_of: Int[np.ndarray, " m"],
-    lines: Float[np.ndarray, "w 2"],
-    feet: Float[np.ndarray, " w"],
+    lines: Float[np.ndarray, "m 2"],
+    feet: Float[np.ndarray, " m"],
     bearings_rad: Float[np.ndarray, " b"],
     ranges_m: Float[np.ndarray, " b"],
     sigmas_m: Float[np.ndarray, " b"],
@@ -29,7 +79,7 @@ def beams_on_lines(
     """Return where beams meet the lines of walls, m along these, by how much they miss them, its sigma, and whose.
 
     Each segment has the beams from its first to its last, in a turn of the scanner; those two may be of another face,
-    and so may beams that miss the segment's own line. The segments are given wall by wall, in the order of a walk.
+    and so may beams that miss the segment's own line. Segments, and the lines of their walls, are given as `walked`.
     """
     most, turn = 0, len(bearings_rad)
     for k in range(len(runs)):
@@ -37,16 +87,16 @@ def beams_on_lines(
     along, across, sigma, of = np.empty(most), np.empty(most), np.empty(most), np.empty(most, np.int64)
     count = 0
     for k in range(len(runs)):
-        beams, w = (runs[k, 1] - runs[k, 0]) % turn + 1, wall_of[k]
+        beams = (runs[k, 1] - runs[k, 0]) % turn + 1
         for number in range(1, beams - 1):
             beam = (runs[k, 0] + number) % turn
             cosine = math.cos(bearings_rad[beam] - seen[k, 0])
             if abs(ranges_m[beam] * cosine - seen[k, 1]) < gate_sigmas * sigmas_m[beam] * cosine:
-                off_normal = bearings_rad[beam] - lines[w, 0]
+                off_normal = bearings_rad[beam] - lines[k, 0]
                 # Where beams meet the line, not where they ended: at a flat angle noise in range is noise along it.
-                along[count] = feet[w] + lines[w, 1] * math.tan(off_normal)
-                across[count] = ranges_m[beam] * math.cos(off_normal) - lines[w, 1]
-                sigma[count], of[count] = sigmas_m[beam] * cosine, w
+                along[count] = feet[k] + lines[k, 1] * math.tan(off_normal)
+                across[count] = ranges_m[beam] * math.cos(off_normal) - lines[k, 1]
+                sigma[count], of[count] = sigmas_m[beam] * cosine, wall_of[k]
                 count += 1
     return along[:count].copy(), across[:count].copy(), sigma[:count].copy(), of[:count].copy()
 
@@ -126,6 +176,18 @@ def breaks_of_beams(
 
 
 @compiled
+def keep_surest(
+    sums: Float[np.ndarray, "5 p"], begin: int, pitch_m: float, least_ratio: float, broken: Float[np.ndarray, "5"]
+) -> None:
+    """Keep the likeliest break, where it is likely enough: its place m, step m and turn rad, and what was seen, m."""
+    broken[:] = 0.0
+    at, step, turn, ratio = surest(sums, least_ratio)
+    if ratio > least_ratio:
+        broken[0], broken[1], broken[2] = pitch_m * (begin + at), step, turn
+        broken[3], broken[4] = pitch_m * begin, pitch_m * (begin + sums.shape[1] - 1)
+
+
+@compiled
 def surest(sums: Float[np.ndarray, "5 p"], least_ratio: float) -> tuple[int, float, float, float]:
     """Return where the likeliest break lies, its step m and turn rad, and its likelihood ratio.
 
@@ -152,14 +214,31 @@ def surest(sums: Float[np.ndarray, "5 p"], least_ratio: float) -> tuple[int, flo
 
 
 @compiled
-def misfits(broken: Float[np.ndarray, "n 3"], extents: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+def faces_off(
+    broken: Float[np.ndarray, "n 5"], extents: Float[np.ndarray, "n 2"]
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 2"], Bool[np.ndarray, " n"]]:
+    """Return the `misfits` of walls, over what their lines were drawn, and which are broken between their ends.
+
+    What beams have shown beyond their extents drew the line, too: a wall that ends at its bend now was seen past it
+    before.
+    """
+    drawn, crooked = np.empty((len(broken), 2)), np.empty(len(broken), np.bool_)
+    for k in range(len(broken)):
+        drawn[k, 0], drawn[k, 1] = min(extents[k, 0], broken[k, 3]), max(extents[k, 1], broken[k, 4])
+        is_broken = broken[k, 1] != 0.0 or broken[k, 2] != 0.0
+        crooked[k] = is_broken and extents[k, 0] < broken[k, 0] < extents[k, 1]
+    return misfits(broken, drawn), drawn, crooked
+
+
+@compiled
+def misfits(broken: Float[np.ndarray, "n b"], extents: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
     """Return how far the faces of walls are off the lines through them, as variances across, m^2.
 
     A face is off the line through both by twice the root mean square of what both are, anywhere along the wall.
     """
     found = np.zeros(len(broken))
     for k in range(len(broken)):
-        place, step, turn = broken[k]
+        place, step, turn = broken[k, 0], broken[k, 1], broken[k, 2]
         half = 0.5 * (extents[k, 1] - extents[k, 0])
         s = place - 0.5 * (extents[k, 0] + extents[k, 1])
         if (step != 0.0 or turn != 0.0) and half > 0.0 and abs(s) < half:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ...robot import Scan
-from .ray_kernels import crossings
+from .ray_kernels import crossings, reaching
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class RayEvidence:
 
     def reaching(self, extents: Float[np.ndarray, "n 2"], margin_m: float) -> Int[np.ndarray, " n"]:
         """Return how many beams reach each wall between its ends: they end on it, or go on beyond it."""
-        return np.count_nonzero((self.across >= -margin_m) & self.between(extents), axis=1)
+        return reaching(self.along, self.across, extents, margin_m)
 
 
 def ray_evidence(

@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ...geometry.compiled import compiled
 from ...geometry.line_kernels import GRAZING, lines_from
@@ -32,3 +32,18 @@ def crossings(
                 along[line, beam] = feet[line] + distance * (y[beam] * nx - x[beam] * ny)
                 across[line, beam] = (passed_m[beam] - distance) * cosine
     return along, across
+
+
+@compiled
+def reaching(
+    along: Float[np.ndarray, "n k"],
+    across: Float[np.ndarray, "n k"],
+    extents: Float[np.ndarray, "n 2"],
+    margin_m: float,
+) -> Int[np.ndarray, " n"]:
+    """Return how many beams reach each wall between its ends: they end on it, or go on beyond it."""
+    count = np.zeros(len(extents), np.int64)
+    for n in range(len(extents)):
+        for beam in range(along.shape[1]):
+            count[n] += across[n, beam] >= -margin_m and extents[n, 0] < along[n, beam] < extents[n, 1]
+    return count

@@ -8,9 +8,12 @@ from ...geometry.compiled import compiled
 
 @compiled
 def rows_of(known: Int[np.ndarray, " m"], ids: Int[np.ndarray, " n"]) -> tuple[Int[np.ndarray, " n"], bool]:
-    """Return where ids stand among those known, or would stand; and whether all are known."""
+    """Return where ids stand among those known, or would stand, -1 for -1 (none); and whether all are known."""
     rows, all_known = np.empty(len(ids), np.int64), True
     for k in range(len(ids)):
+        if ids[k] < 0:
+            rows[k] = -1
+            continue
         low, high = 0, len(known)
         while low < high:
             middle = (low + high) // 2

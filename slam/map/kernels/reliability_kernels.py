@@ -5,19 +5,22 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ...extraction.straightness_kernels import edge_cov, edge_variance
+from ...extraction.straightness_kernels import edge_cov, edge_variance, middles_of
 from ...geometry.compiled import compiled
+from .profile_kernels import faces_off
 
 
 @compiled
 def add_lengths(
     rows: Int[np.ndarray, " m"],
+    cov: Float[np.ndarray, "m 2 2"],
     ends: Float[np.ndarray, "m 2 2"],
     longest: Float[np.ndarray, "n 2"],
 ) -> None:
-    """Keep the two longest pieces, m, that scans saw of each wall, the shorter first."""
+    """Keep the two longest pieces, m, that scans saw of each wall (row, -1 for none), the shorter first."""
     for k in range(len(rows)):
-        keep_longest(longest[rows[k]], math.hypot(ends[k, 1, 0] - ends[k, 0, 0], ends[k, 1, 1] - ends[k, 0, 1]))
+        if rows[k] >= 0 and cov[k, 0, 0] > 0.0:
+            keep_longest(longest[rows[k]], math.hypot(ends[k, 1, 0] - ends[k, 0, 0], ends[k, 1, 1] - ends[k, 0, 1]))
 
 
 @compiled
@@ -25,6 +28,31 @@ def keep_longest(longest: Float[np.ndarray, "2"], length_m: float) -> None:
     """Take one more length into the two longest, in place."""
     longest[0] = max(longest[0], min(longest[1], length_m))
     longest[1] = max(longest[1], length_m)
+
+
+@compiled
+def lack_of_fit(
+    lines: Float[np.ndarray, "s 2"],
+    ends: Float[np.ndarray, "s 2 2"],
+    broken: Float[np.ndarray, "s 5"],
+    extents: Float[np.ndarray, "s 2"],
+) -> Float[np.ndarray, "s 2 2"]:
+    """Return how far the face that each segment shows may be from the line of its wall, of (alpha rad, r m)."""
+    misfits_m2, drawn, _ = faces_off(broken, extents)
+    return edge_cov(misfits_m2, drawn[:, 1] - drawn[:, 0], middles_of(lines, ends))
+
+
+@compiled
+def off_lines(
+    extents: Float[np.ndarray, "n 2"],
+    longest: Float[np.ndarray, "n 2"],
+    broken: Float[np.ndarray, "n 5"],
+    edge_m: float,
+    face_m: float,
+) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 2 2"]]:
+    """Return which walls are broken between their ends, and the `off_line_cov` of all."""
+    misfits_m2, drawn, crooked = faces_off(broken, extents)
+    return crooked, off_line_cov(extents, longest, misfits_m2, drawn, edge_m, face_m)
 
 
 @compiled

@@ -21,7 +21,7 @@ def test_walls_of_true_lines_lie_on_them_however_short_they_are():
     for config in (MapperConfig(), of_true_lines(MapperConfig())):
         reliability = Reliability(config.walls.reliability)
         reliability._records.rows(ids)  # the wall begins
-        told.append(reliability.off_line_cov(ids, extents, np.zeros(1), extents))
+        told.append(reliability.off_line_cov(extents, np.zeros((1, 5)))[1])
     usual, true = told
     assert usual[0, 0, 0] > 0.0
     np.testing.assert_array_equal(true, np.zeros((1, 2, 2)))

@@ -12,8 +12,7 @@ from chainslam.slam.extraction.segments import EndKind
 from chainslam.slam.map.profiles import Profiles
 from chainslam.slam.robot import Scan
 from tests.slam.extraction.test_extract import CLOSED
-from tests.slam.map import scenes
-from tests.slam.map.test_profiles import look, random_poses
+from tests.slam.map.test_profiles import faces_of, look, random_poses
 
 FAR = LidarConfig(beams=541, range_max_m=12.0, sigma_m=0.005, sigma_share=0.02)
 WALL = np.array([[[-2.0, 0.0], [9.0, 0.0]]])
@@ -78,14 +77,14 @@ def test_noise_that_grows_with_the_range_breaks_no_wall():
     config = LidarConfig(sigma_share=0.03)
     face = np.array([[[6.0, 0.0], [-6.0, 0.0]]])
     finder, rng = RangeFinder(face, config), np.random.default_rng(3)
-    profiles, wall, ends = Profiles(), np.array([scenes.WALL]), np.array([[-6.0, 6.0]])
+    profiles, ends = Profiles(), np.array([[-6.0, 6.0]])
     for k, pose in enumerate(random_poses(rng, 400)):
         exact = finder.cast(pose)[0]
         measured = noisy(exact, beam_sigmas(exact, config), rng.standard_normal(180), config.range_max_m)
         scan = Scan(finder.bearings_rad, measured, config.sigma_m, config.range_max_m, 0.1 * k, config.sigma_share)
         segments = extract(scan)
         look(profiles, pose, scan, segments.take(~segments.is_tentative))
-        assert profiles.misfits(wall, ends)[0] == 0.0
+        assert faces_of(profiles, ends)[0] == 0.0
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -192,7 +192,7 @@ def test_a_misfit_is_twice_what_the_residuals_show_beyond_the_noise():
     assert found == pytest.approx(4.0 * 32.0 * variance / 10)
     assert misfit_variances(cov, np.array([19.9]), np.array([10]), 3.0) == 0.0
     lines, ends = np.array([[0.0, 1.0]]), np.array([[[1.0, -0.5], [1.0, 0.5]]])
-    (told,) = faces_cov(lines, ends, np.array([found]), 0.0, 0.2)
+    (told,) = faces_cov(lines, ends, cov, np.array([40.0]), np.array([10]), 3.0, 0.0, 0.2)
     np.testing.assert_allclose(told, [[12.0 * found, 0.0], [0.0, found]], atol=1e-12)
 
 

@@ -12,6 +12,7 @@ from chainslam.slam.map.kernels.chain_kernels import (
     TAIL,
     Reach,
     joinable,
+    linked,
     near_ends,
     runs,
     successors,
@@ -89,3 +90,26 @@ def test_runs_are_the_connected_parts_of_the_links(seed):
         assert successor[run[:-1]].tolist() == run[1:]
         assert (successor[run[-1]] == run[0]) == is_closed
         assert not is_closed or run[0] == min(run)
+
+
+@few
+@given(seed=seeds)
+def test_linked_walls_meet_where_their_lines_cross_near_both_ends_or_amid_these(seed):
+    ends, lines = walls(seed)
+    aside = np.random.default_rng(seed).random((len(ends), 2)) < 0.5
+    anchors = np.random.default_rng(seed).normal(size=(len(ends), 2))
+    offsets = np.sum(anchors * np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])]), axis=1)
+    means = np.column_stack([lines[:, 0], lines[:, 1] - offsets])
+    walked, starts, closed, corners = linked(ends, anchors, means, aside, 0.9, 0.5, REACH)
+    for (i, j), is_closed in zip(pairwise(starts), closed, strict=True):
+        for one, other, corner in zip(walked[i:j], np.roll(walked[i:j], -1), corners[i:j], strict=True):
+            if one == walked[j - 1] and not is_closed:
+                assert np.isnan(corner).all()
+                continue
+            met = np.array([ends[one, HEAD], ends[other, TAIL]])
+            assert np.hypot(*(met[1] - met[0])) <= (0.8 if aside[one, HEAD] and aside[other, TAIL] else 0.3)
+            alpha, expected = lines[[one, other], 0], met.mean(axis=0)
+            if abs(np.sin(alpha[1] - alpha[0])) >= 0.05:
+                crossing = np.linalg.solve(np.column_stack([np.cos(alpha), np.sin(alpha)]), lines[[one, other], 1])
+                expected = crossing if np.hypot(*(met - crossing).T).max() <= 0.5 else expected
+            np.testing.assert_allclose(corner, expected, atol=1e-9)

@@ -14,8 +14,9 @@ from chainslam.slam.estimation.backend import Belief
 from chainslam.slam.geometry.lines import directions, normals, through
 from chainslam.slam.geometry.poses import rotation
 from chainslam.slam.map.chains import connect
-from chainslam.slam.map.displacement import across, along
+from chainslam.slam.map.displacement import along
 from chainslam.slam.map.extents import WallsConfig
+from chainslam.slam.map.kernels.wall_kernels import across
 from chainslam.slam.map.landmarks import Landmarks
 from tests.slam.test_mapper import AT_ITS_WORD, faces_of, walk
 

@@ -37,7 +37,7 @@ def test_what_is_left_of_a_wall_is_the_piece_that_most_beams_end_on(seed):
 def test_ends_move_out_to_what_is_seen_and_in_to_a_sharper_corner(seed):
     rng = np.random.default_rng(seed)
     m, pose = rng.integers(0, 6), rng.uniform(-2.0, 2.0, 3)
-    rows, kinds = rng.integers(0, 3, m), rng.integers(0, 3, (m, 2))
+    rows, kinds = rng.integers(-1, 3, m), rng.integers(0, 3, (m, 2))
     anchors, means = rng.uniform(-1.0, 1.0, (3, 2)), rng.uniform(-1.0, 1.0, (3, 2))
     ends, lines = rng.uniform(-2.0, 2.0, (m, 2, 2)), rng.uniform(0.01, 2.0, (m, 2))
     extents = np.where(rng.random((3, 1)) < 0.3, [[np.inf, -np.inf]], np.sort(rng.uniform(-1.0, 1.0, (3, 2)), axis=1))
@@ -45,6 +45,8 @@ def test_ends_move_out_to_what_is_seen_and_in_to_a_sharper_corner(seed):
     before, expected, apart_before, count = extents.copy(), extents.copy(), spacing.copy(), whole.copy()
     along, apart = seen_along(ends, lines, rows, pose, anchors, means, 0.03)
     for k, row in enumerate(rows):
+        if row < 0:
+            continue
         for side in (0, 1):
             t = np.array([-np.sin(means[row, 0]), np.cos(means[row, 0])])
             np.testing.assert_allclose(along[k, side], t @ (to_world(ends[k, side], pose) - anchors[row]), atol=1e-12)

@@ -33,8 +33,15 @@ def look(face_world: np.ndarray, pose_world: np.ndarray, rng: np.random.Generato
     )
 
 
-def candidates(existence: ExistenceConfig = CONFIG) -> LandmarkCandidates:
-    return LandmarkCandidates(GATE, ANGLE_RAD, LEAST_BEAMS, existence)
+class Looked(LandmarkCandidates):
+    """All segments that are shown have few beams."""
+
+    def see(self, pose_world, scan, segments):
+        return super().see(pose_world, scan, segments, np.arange(len(segments)))
+
+
+def candidates(existence: ExistenceConfig = CONFIG) -> Looked:
+    return Looked(GATE, ANGLE_RAD, LEAST_BEAMS, existence)
 
 
 def scan_of(faces: list[np.ndarray], pose: np.ndarray) -> Scan:

@@ -1,7 +1,5 @@
 """One wall that stands in the map twice is found; two walls that are near each other never are one."""
 
-from functools import partial
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,7 +11,12 @@ from chainslam.slam.map.merging import MergingConfig, duplicate_of, lying_along
 from chainslam.slam.map.stochastic_map import StochasticMap
 
 CONFIG = MergingConfig()
-twice = partial(duplicate_of, one_wall=MatchingConfig().one_wall)
+
+
+def twice(known, touched):
+    return duplicate_of(known, np.array(list(touched), dtype=np.int64), MatchingConfig().one_wall)
+
+
 angles, places = st.floats(-3.1, 3.1), st.floats(-20.0, 20.0)
 
 
@@ -149,7 +152,7 @@ def test_candidates_are_those_of_a_plain_loop():
             if near and apart <= -CONFIG.shared.resolution_m and straight:
                 plain.append((int(known.ids[i]), int(known.ids[j])))
     assert len(plain) > 5
-    pairs, hidden = lying_along(known, touched, CONFIG)
+    pairs, hidden = lying_along(known, np.array(list(touched)), CONFIG)
     assert pairs.tolist() == [list(pair) for pair in plain]
     for (one, other), is_hidden in zip(np.searchsorted(known.ids, pairs), hidden, strict=True):
         long, short = (one, other) if lines[one][2] > lines[other][2] else (other, one)

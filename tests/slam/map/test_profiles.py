@@ -6,25 +6,38 @@ import pytest
 from chainslam.slam.estimation.backend import Belief
 from chainslam.slam.estimation.shared import SharedConfig
 from chainslam.slam.extraction.extract import extract
-from chainslam.slam.map.kernels.profile_kernels import breaks_of_beams, misfits, places_between, surest
+from chainslam.slam.geometry.lines import directions
+from chainslam.slam.map.kernels.profile_kernels import (
+    breaks_of_beams,
+    faces_off,
+    misfits,
+    places_between,
+    surest,
+    walked,
+)
 from chainslam.slam.map.profiles import Profiles
 from chainslam.slam.map.records import Records
 from chainslam.slam.robot import Scan
 from tests.slam.map.scenes import SIGMA_M, WALL, bent, scans, stepped
 
 WHOLE = np.array([[-3.0, 3.0]])
+LINE = np.array([[np.pi / 2, 0.0]])
 
 
 def belief_of(pose, off=(0.0, 0.0)):
     """Return a belief in one wall along y = 0, free side below, anchored at the origin; its line off by (rad, m)."""
-    line = np.array([[np.pi / 2 + off[0], off[1]]])
-    return Belief(pose, np.eye(3), np.array([WALL]), np.zeros((1, 2)), line, lambda ids: None)
+    return Belief(pose, np.eye(3), np.array([WALL]), np.zeros((1, 2)), LINE + np.array(off), lambda ids: None)
 
 
 def look(profiles, pose, scan, segments=None, off=(0.0, 0.0)):
     """Show a scan's segments to the sums, all as parts of the wall."""
     segments = extract(scan) if segments is None else segments
-    profiles.see(belief_of(pose, off), scan, segments, np.full(len(segments), WALL))
+    profiles.see(belief_of(pose, off), scan, segments, np.tile(profiles._records.rows(np.array([WALL])), len(segments)))
+
+
+def faces_of(profiles, extents):
+    """Return how far the faces of all walls are off their lines, over what, and which walls are broken."""
+    return faces_off(profiles._records.columns["broken"], extents)
 
 
 def random_poses(rng, count, along_m=3.0):
@@ -111,6 +124,16 @@ def test_a_break_has_a_step_and_a_turn_only_where_one_alone_explains_much_less(s
     np.testing.assert_allclose([at, step, turn, ratio], [0, *expected, left["none"][0] - left["both"][0]], rtol=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(9))
+def test_segments_are_walked_wall_by_wall_with_the_free_side_on_the_left(seed):
+    rng = np.random.default_rng(seed)
+    rows, means = rng.integers(-1, 3, 12), rng.normal(size=(3, 2))
+    ends = np.round(rng.uniform(-1.0, 1.0, (12, 2, 2)), 1)
+    along = np.vecdot(ends.mean(axis=1), directions(means[rows, 0] - 0.3))
+    expected = [k for k in np.lexsort((along, rows)) if rows[k] >= 0]
+    assert walked(ends, rows, 0.3, means).tolist() == expected
+
+
 def test_fewer_than_two_beams_beside_a_place_say_nothing_of_it():
     along, one = np.array([0.0, 0.1, 0.2, 0.3]), np.zeros(4, dtype=np.int64)
     across, sigma = np.array([0.0, 0.0, 0.02, 0.02]), np.full(4, 0.01)
@@ -166,12 +189,12 @@ def test_a_break_that_no_scan_shows_is_stated_as_far_off_as_it_puts_the_faces(fa
         true = np.select([(at >= min(f[:, 0])) & (at <= max(f[:, 0])) for f in near],
                          [np.interp(at, np.sort(f[:, 0]), f[np.argsort(f[:, 0]), 1]) for f in near])  # fmt: skip
         off = true - np.polynomial.Polynomial.fit(at, true, 1)(at)
-        (found,), _ = profiles.misfits(np.array([WALL]), np.array([[-1.0, 1.0]]))
+        (found,), *_ = faces_of(profiles, np.array([[-1.0, 1.0]]))
         assert 0.5 < np.sqrt(found / (4.0 * np.mean(off**2))) < 1.5
-        broken = records.columns["broken"][:, :3].copy()
+        broken = records.columns["broken"]
         assert len(faces) == 2 or broken[0, 2] == 0.0  # of a step alone scans tell no turn
         longer = np.array([[0.05 * first - 1.0, 0.05 * (first + sums.shape[1] - 1) + 0.5]])
-        off_m2, over = profiles.misfits(np.array([WALL]), longer)
+        off_m2, over, _ = faces_of(profiles, longer)
         assert off_m2 == pytest.approx(misfits(broken, longer)) != found
         np.testing.assert_array_equal(over, longer)
 
@@ -182,8 +205,8 @@ def test_a_wall_is_crooked_only_where_its_break_lies_between_its_ends():
     walls = records.rows(np.arange(4))
     records.columns["broken"][walls[1:]] = [[0.5, 0.02, 0, -2, 2], [0.5, 0, 0.1, -2, 2], [-2.0, 0.02, 0.1, -2, 2]]
     extents = np.array([[-1.0, 1.0]] * 4)
-    assert profiles.crooked(np.arange(4), extents).tolist() == [False, True, True, False]
-    assert profiles.crooked(np.arange(4), extents - [[0.0, 0.6]]).tolist() == [False] * 4
+    assert faces_of(profiles, extents)[2].tolist() == [False, True, True, False]
+    assert faces_of(profiles, extents - [[0.0, 0.6]])[2].tolist() == [False] * 4
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -192,7 +215,7 @@ def test_a_straight_wall_is_never_broken(seed):
     profiles, poses = Profiles(), random_poses(rng, 700)
     for pose, scan in zip(poses, scans(bent(0.0), poses, rng), strict=True):
         look(profiles, pose, scan)
-        assert profiles.misfits(np.array([WALL]), WHOLE)[0] == 0.0
+        assert faces_of(profiles, WHOLE)[0] == 0.0
 
 
 def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_break():
@@ -204,7 +227,7 @@ def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_break():
         ranges = scan.ranges_m.copy()
         ranges[segments.beams[0, 1]] += 0.03
         look(profiles, pose, Scan(scan.bearings_rad, ranges, SIGMA_M, 4.0, 0.0), segments.take(np.array([0])))
-    assert profiles.misfits(np.array([WALL]), WHOLE)[0] == 0.0
+    assert faces_of(profiles, WHOLE)[0] == 0.0
 
 
 def test_two_segments_of_one_wall_tell_the_step_between_them():
@@ -217,8 +240,8 @@ def test_two_segments_of_one_wall_tell_the_step_between_them():
     alone, both = Profiles(), Profiles()
     look(alone, pose, scan, segments.take(on_wall[:1]))
     look(both, pose, scan, segments.take(on_wall))
-    ids, ends = np.array([WALL]), np.array([[-1.4, 1.4]])
-    assert alone.misfits(ids, ends)[0] == 0.0 < both.misfits(ids, ends)[0]
+    ends = np.array([[-1.4, 1.4]])
+    assert faces_of(alone, ends)[0] == 0.0 < faces_of(both, ends)[0]
 
 
 def test_what_was_seen_of_a_merged_wall_counts_where_it_lies():
@@ -229,10 +252,13 @@ def test_what_was_seen_of_a_merged_wall_counts_where_it_lies():
     split, one = Profiles(shared, records), Profiles(shared, whole)
     for k, (pose, scan) in enumerate(zip(poses, scans(bent(np.deg2rad(0.7)), poses, rng), strict=True)):
         segments = extract(scan)
-        other, moved = k % 2, np.array([[0.6 * (k % 2), 0.0]])
-        line = np.array([[np.pi / 2, 0.0]])
-        belief = Belief(pose, np.eye(3), np.array([WALL + other]), moved, line, lambda ids: None)
-        split.see(belief, scan, segments, np.full(len(segments), WALL + other))
+        ids, anchors, lines = np.array([WALL, WALL + 1]), np.array([[0.0, 0.0], [0.6, 0.0]]), np.tile(LINE, (2, 1))
+        split.see(
+            Belief(pose, np.eye(3), ids, anchors, lines, lambda ids: None),
+            scan,
+            segments,
+            np.full(len(segments), records.rows(ids)[k % 2]),
+        )
         look(one, pose, scan, segments)
     records.merge(WALL, WALL + 1, -0.6)
     assert records.ids.tolist() == [WALL]

@@ -104,6 +104,7 @@ def test_the_reliability_of_a_merged_wall_is_that_of_one_that_made_all_observati
     first, second = observations(rng, 12), observations(rng, 15)
     apart, together = Records(), Records()
     split, whole = Reliability(records=apart), Reliability(records=together)
+    apart.rows(np.arange(2)), together.rows(np.arange(1))
     for segments, owner in ((first, 0), (second, 1)):
         for k in range(len(segments)):
             split.see(segments.take(np.array([k])), np.array([owner]))

@@ -128,9 +128,10 @@ def test_beside_a_clear_observation_few_beams_tell_their_distance_at_their_middl
 def test_a_wall_counts_as_long_as_two_scans_saw_it():
     """Two beams on a wall's end and six on a face behind it make a line of 0.6 m, once; all others show the end."""
     reliability, extents = Reliability(), np.array([[0.0, 0.6]])
+    reliability._records.rows(OWNER)
 
     def turn_rad():
-        return float(np.sqrt(reliability.off_line_cov(OWNER, extents, np.zeros(1), extents)[0, 0, 0]))
+        return float(np.sqrt(reliability.off_line_cov(extents, np.zeros((1, 5)))[1][0, 0, 0]))
 
     reliability.see(observation(0.0, 0.01, length_m=0.6), OWNER)
     alone = turn_rad()
@@ -144,6 +145,7 @@ def test_a_wall_counts_as_long_as_two_scans_saw_it():
 
 def test_the_longest_pieces_of_two_walls_that_are_one_are_the_longest_of_both():
     reliability = Reliability()
+    reliability._records.rows(np.arange(2))
     for length, owner in ((0.3, 0), (0.9, 0), (0.5, 1), (0.2, 1)):
         reliability.see(observation(0.0, 0.01, length_m=length), np.array([owner]))
     reliability._records.merge(0, 1, 0.0)

@@ -45,10 +45,11 @@ def test_where_walls_begin_and_end_and_how_far_they_are(seed):
 @given(seed=seeds)
 def test_walls_lie_along_each_other_within_the_shorter_ones_distance_from_the_longer_ones_line(seed):
     rng, alpha, ends = scene(seed, most=16)
-    ids, trusted = np.cumsum(rng.integers(1, 3, len(alpha))), rng.random(len(alpha)) < 0.9
+    ids, tentative = np.cumsum(rng.integers(1, 3, len(alpha))), rng.random(len(alpha)) >= 0.9
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
-    touched = np.unique(rng.integers(0, ids[-1] + 3, 3))
-    pairs, beside = lying_along(ids, touched, trusted, alpha, ends, lengths, np.cos(0.3), 0.15)
+    touched, means = rng.integers(-1, ids[-1] + 3, 3), np.column_stack([alpha, alpha])
+    extents = np.column_stack([np.zeros(len(alpha)), lengths])
+    pairs, beside = lying_along(ids, touched, tentative, means, ends, extents, np.cos(0.3), 0.15)
     expected = []
     for one in range(len(alpha)):
         for other in range(one + 1, len(alpha)):
@@ -57,7 +58,7 @@ def test_walls_lie_along_each_other_within_the_shorter_ones_distance_from_the_lo
             across = np.abs((ends[shorter] - ends[longer, 0]) @ n).max()
             low, high = (ends[shorter] - ends[longer, 0]) @ t
             overlap = min(lengths[longer] - low, high)
-            ours = trusted[one] and trusted[other] and bool({ids[one], ids[other]} & set(touched))
+            ours = not (tentative[one] or tentative[other]) and bool({ids[one], ids[other]} & set(touched))
             if ours and abs(alpha[one] - alpha[other]) < 0.3 and across <= 0.15 and overlap >= 0.15:
                 expected.append(([one, other], lengths[shorter], across, overlap))
     assert pairs.tolist() == [one[0] for one in expected]
