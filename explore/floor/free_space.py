@@ -121,7 +121,8 @@ class FreeSpace:
 
     def inside(self, cells: Int[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
         """Return which cells lie on the grid."""
-        return np.all((cells >= 0) & (cells < self._evidence.shape), axis=-1)
+        within = (cells >= 0) & (cells < self._evidence.shape)
+        return within[..., 0] & within[..., 1]
 
     def unknown_at(self, points_world: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
         """Return which points lie on floor that was never seen."""
