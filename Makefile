@@ -29,7 +29,7 @@ test: setup
 
 # What takes minutes or needs a browser (Debian: `apt-get install chromium`).
 test-long: setup
-	$(BIN)/python -m pytest -n 2 --quiet -m long tests
+	$(BIN)/python -m pytest -n 2 --quiet -m long $(if $(MINUTES),-rs --minutes $(MINUTES)) tests
 
 # How many of the small faults put into the modules of tests/mutants.toml do their own tests notice? MODULE=... for one.
 mutants: setup

@@ -1,6 +1,7 @@
 """What all tests share."""
 
 import signal
+import time
 from pathlib import Path
 
 import jaxtyping
@@ -10,6 +11,26 @@ from hypothesis import settings
 # A kernel that is not in the cache yet compiles at its first example; no test is about time.
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+
+BEGAN = pytest.StashKey[float]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add what bounds the time of a run."""
+    parser.addoption("--minutes", type=float, help="tests that have not begun after so many minutes are skipped")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Note when the run began."""
+    config.stash[BEGAN] = time.monotonic()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what begins too late: on a slow machine a run that ends tells more than one that is cut off."""
+    minutes = item.config.getoption("--minutes")
+    if minutes is not None and time.monotonic() - item.config.stash[BEGAN] > 60.0 * minutes:
+        pytest.skip(f"{minutes:g} minutes are over")
 
 
 @pytest.fixture(scope="session", autouse=True)
