@@ -182,7 +182,10 @@ def headlines(rows: Sequence[Row]) -> Table:
             f" {100 * np.mean(numbers(driven, 'coverage_own_frame')):.1f} % of the walls mapped",
         ],
         ["log of the Intel lab, after offline refinement", f"{refined:.3f} m mean error of the published relations"],
-        ["processor time from scan to motion command", f"{mean_of(driven, 'step_ms_mean'):.1f} ms on one core of a busy machine"],
+        [
+            "processor time from scan to motion command",
+            f"{mean_of(driven, 'step_ms_mean'):.1f} ms on one core of a busy machine",
+        ],
     ]
 
 
