@@ -33,10 +33,6 @@ class View:
         """Return the matches that are beyond doubt."""
         return self.method.matcher(self.segments, self.walls, self.joint, self.config, clear_only=True)
 
-    def match_all(self) -> Matches:
-        """Return all matches, from the pose before the scan."""
-        return self.method.matcher(self.segments, self.walls, self.joint, self.config)
-
     def seen(self, first: Observations) -> JointObservations:
         """Return observations of some of the walls beside what was believed of them before."""
         return seen_halfway(self.joint, self.walls.ids, first)

@@ -1,11 +1,13 @@
 """The settings of the extraction."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from ..estimation.shared import SharedConfig, of_shared
-from ..geometry.quantities import Beams, Number, Part, Sigmas, Turn, Weight
+from ..geometry.quantities import Beams, Count, Number, Part, Sigmas, Turn, Weight
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,12 @@ class ExtractionConfig:
     grazing_rad: Turn = float(np.deg2rad(6.0))
     """Smallest angle of incidence that is assumed of a wall: a range jump that would need a smaller one splits the
     scan."""
+    scales: Annotated[tuple[Count, ...], Meta(min_length=1)] = (3, 8, 20)
+    """Numbers of beams on either side of a possible breakpoint over which two lines are compared with one."""
+    candidate_gain: Weight = 7.0
+    """Decrease of chi-square by two lines that makes a candidate breakpoint; a low value only costs computing time."""
+    sure_gain: Weight = 30.0
+    """Decrease of chi-square from which the neighbours of a candidate are candidates too."""
     segment_cost: Weight = 20.0
     """Decrease of chi-square that one more segment must bring; with a lower value noise splits straight walls."""
     least_beams: Beams = 3

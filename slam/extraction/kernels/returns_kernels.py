@@ -14,6 +14,9 @@ class Rules(NamedTuple):
     noise_sigmas: float
     gap_beams: int
     grazing_rad: float
+    scales: Int[np.ndarray, " s"]
+    candidate_gain: float
+    sure_gain: float
     segment_cost: float
     least_beams: int
     sure_beams: int

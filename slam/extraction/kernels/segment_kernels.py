@@ -1,4 +1,4 @@
-"""From a scan to straight segments: break, cut by dynamic programming, sharpen the joints, fit, find ends."""
+"""From a scan to straight segments: break, choose cuts by dynamic programming, sharpen the joints, fit, find ends."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from .fit_kernels import Fitted, fitted
 from .joint_kernels import sharpened
 from .line_kernels import crossing, line_of, met_at, polar, prefix_sums
 from .returns_kernels import Returns, Rules, returns_of, rolled, run_of, turn_of, turned
-from .split_kernels import split, surest
+from .split_kernels import candidates, settled, split, split_gains, surest
 
 _OPEN, _OCCLUDED, _CORNER = int(EndKind.OPEN), int(EndKind.OCCLUDED), int(EndKind.CORNER)
 
@@ -42,12 +42,14 @@ def segments_of(
     """Return the straight segments of a scan, and which are good."""
     returns = returns_of(bearings_rad, ranges_m, sigmas_m, sigma_share, farthest_m, is_full_turn, rules)
     sums = prefix_sums(returns.cos, returns.sin, returns.ranges_m, returns.sigmas_m)
-    pieces = split(sums, returns.breaks, rules)
-    if returns.is_ring:
+    gains = split_gains(sums, returns.breaks, rules)
+    if returns.is_ring and len(returns.beam) >= rules.least_beams:
         # The seam must lie at a corner, else it cuts a wall in two; the surest cut is one.
-        returns = rolled(returns, surest(pieces, sums))
+        returns = rolled(returns, surest(gains))
         sums = prefix_sums(returns.cos, returns.sin, returns.ranges_m, returns.sigmas_m)
-        pieces = split(sums, returns.breaks, rules)
+        gains = split_gains(sums, returns.breaks, rules)
+    pieces = split(sums, candidates(gains, returns.breaks, rules), returns.breaks, rules)
+    pieces = settled(pieces, sums, returns.breaks, rules)
     return _described(fitted(sharpened(pieces, sums, returns, rules), returns, rules), returns, rules)
 
 

@@ -1,4 +1,4 @@
-"""Breaks, the cheapest division and its surest cut, against slow truths that fit each run by itself."""
+"""Breaks, candidates, the choice among them, and where cuts settle, against slow truths that fit each run by itself."""
 
 import itertools
 from dataclasses import replace
@@ -12,7 +12,14 @@ from chainslam.slam.extraction.config import ExtractionConfig
 from chainslam.slam.extraction.extract import beams_of_scan, extract, rules_of
 from chainslam.slam.extraction.kernels.line_kernels import prefix_sums
 from chainslam.slam.extraction.kernels.returns_kernels import returns_of
-from chainslam.slam.extraction.kernels.split_kernels import split, surest
+from chainslam.slam.extraction.kernels.split_kernels import (
+    bend_within,
+    candidates,
+    choose,
+    settled,
+    split_gains,
+    surest,
+)
 from chainslam.slam.robot import Scan
 from tests.slam.extraction.test_extract import room_scan
 
@@ -73,44 +80,98 @@ def test_a_surface_breaks_off_where_no_wall_has_two_such_ranges(seed, full):
     np.testing.assert_allclose(np.arctan2(returns.sin, returns.cos), np.angle(np.exp(1j * bearings[returns.beam])))
 
 
-@given(seed=seeds, count=st.integers(0, 24), runs=st.integers(1, 3), given_rules=st.booleans())
-@settings(max_examples=200, deadline=None)
-def test_no_division_is_cheaper(seed, count, runs, given_rules):
-    """Nor with rules by which one long piece may cost less than loose beams until a second one is long enough."""
-    beams, rng = Beams(seed), np.random.default_rng(seed)
-    cost, fewest, sigmas = rng.uniform(0.0, 20.0), int(rng.integers(3, 9)), rng.uniform(0.5, 6.0)
-    rules = RULES if given_rules else RULES._replace(segment_cost=cost, least_beams=fewest, outlier_sigmas=sigmas)
-    breaks = np.unique([0, *rng.integers(0, count + 1, runs - 1), count])
-    pieces = split(beams.sums[: count + 1], breaks, rules).tolist()
-    least = [0.0]
-    for stop in range(1, count + 1):
-        run = max(at for at in breaks if at < stop)
-        ways = (
-            least[start] + beams.chi2(start, stop) + rules.segment_cost
-            for start in range(run, stop - rules.least_beams + 1)
-        )
-        least.append(min(least[-1] + rules.outlier_sigmas**2, *ways, np.inf))
-    assert all(one[1] <= other[0] for one, other in itertools.pairwise(pieces))
-    assert all(stop - start >= rules.least_beams for start, stop in pieces)
-    assert not any(start < at < stop for start, stop in pieces for at in breaks)
-    loose = count - sum(stop - start for start, stop in pieces)
-    price = sum(beams.chi2(*piece) + rules.segment_cost for piece in pieces) + rules.outlier_sigmas**2 * loose
-    assert price == pytest.approx(least[count], rel=1e-4, abs=1e-3)
+@given(seed=seeds, middle=st.integers(6, 18))
+@settings(max_examples=30, deadline=None)
+def test_a_gain_is_what_two_lines_save_over_one_at_each_scale_within_the_unbroken_run(seed, middle):
+    beams, breaks = Beams(seed), np.array([0, middle, 24])
+    gains = split_gains(beams.sums, breaks, RULES)
+    assert not gains[:, breaks].any()
+    for k, at in itertools.product(range(len(CONFIG.scales)), range(1, 24)):
+        if at != middle:
+            low, high = (0, middle) if at < middle else (middle, 24)
+            start, stop = max(at - CONFIG.scales[k], low), min(at + CONFIG.scales[k], high)
+            saved = beams.chi2(start, stop) - beams.chi2(start, at) - beams.chi2(at, stop)
+            assert gains[k, at] == pytest.approx(saved, rel=1e-4, abs=1e-3)
+    assert gains[:, surest(gains)].max() == gains.max()
 
 
 @given(seed=seeds)
+@settings(max_examples=100, deadline=None)
+def test_candidates_are_breaks_peaks_and_the_neighbours_of_sure_peaks(seed):
+    rng = np.random.default_rng(seed)
+    gains = np.round(rng.exponential(10.0, (3, 30)))
+    gains[:, [0, 12, 29]] = 0.0
+    expected = {0, 12, 29}
+    for row in gains:
+        for at in range(1, 29):
+            if row[at] > CONFIG.candidate_gain and row[at] == row[at - 1 : at + 2].max():
+                expected |= {at - 1, at, at + 1} if row[at] > CONFIG.sure_gain else {at}
+    assert set(np.flatnonzero(candidates(gains, np.array([0, 12, 29]), RULES)).tolist()) == expected
+
+
+@given(seed=seeds, inner=st.integers(1, 5))
 @settings(max_examples=50, deadline=None)
-def test_the_surest_cut_is_that_at_which_two_lines_save_most(seed):
-    beams = Beams(seed)
-    pieces = [[0, 5], [5, 11], [12, 17], [17, 20], [20, 24]]
+def test_the_dynamic_program_finds_the_cheapest_of_all_divisions(seed, inner):
+    beams, rng = Beams(seed), np.random.default_rng(seed)
+    cuts = np.array([0, *sorted(rng.choice(np.arange(1, 24), inner, replace=False).tolist()), 24])
+    breaks = np.array([0, cuts[rng.integers(1, len(cuts))], 24])
+    breaks = np.unique(breaks)
+    pieces = [tuple(piece) for piece in choose(beams.sums, cuts, breaks, RULES).tolist()]
+
+    def price(segments):
+        covered = sum(stop - start for start, stop in segments)
+        return sum(beams.chi2(*run) + CONFIG.segment_cost for run in segments) + CONFIG.shared.outlier_sigmas**2 * (
+            24 - covered
+        )
+
+    allowed = [
+        (start, stop)
+        for start, stop in itertools.combinations(cuts.tolist(), 2)
+        if stop - start >= CONFIG.least_beams and not any(start < at < stop for at in breaks)
+    ]
+    assert set(pieces) <= set(allowed)
+    divisions = (
+        chosen
+        for size in range(len(cuts))
+        for chosen in itertools.combinations(allowed, size)
+        if all(one[1] <= other[0] for one, other in itertools.pairwise(chosen))
+    )
+    assert price(pieces) == pytest.approx(min(map(price, divisions)), rel=1e-5)
+
+
+@given(seed=seeds, start=st.integers(0, 10), size=st.integers(0, 13))
+@settings(max_examples=50, deadline=None)
+def test_a_bend_is_where_two_lines_save_most_and_more_than_a_segment_costs(seed, start, size):
+    beams, stop = Beams(seed), start + size
     saved = {
-        one[1]: beams.chi2(one[0], other[1]) - beams.chi2(*one) - beams.chi2(*other)
-        for one, other in itertools.pairwise(pieces)
-        if one[1] == other[0]
+        at: beams.chi2(start, stop) - beams.chi2(start, at) - beams.chi2(at, stop)
+        for at in range(start + CONFIG.least_beams, stop - CONFIG.least_beams + 1)
     }
-    found = surest(np.array(pieces), beams.sums)
-    assert saved[found] == pytest.approx(max(saved.values()), rel=1e-4)
-    assert surest(np.array(pieces[1:3]), beams.sums) == surest(np.array(pieces[:1]), beams.sums) == 0
+    found = bend_within(beams.sums, start, stop, RULES)
+    if max(saved.values(), default=0.0) > CONFIG.segment_cost:
+        assert saved[found] == pytest.approx(max(saved.values()), rel=1e-5)
+    else:
+        assert found == -1
+
+
+@given(seed=seeds, broken=st.booleans())
+@settings(max_examples=50, deadline=None)
+def test_cuts_settle_where_their_two_lines_fit_best_all_at_once(seed, broken):
+    beams, rng = Beams(seed), np.random.default_rng(seed)
+    ends = [0, *(6 * np.arange(1, 4) + rng.integers(-2, 3, 3)).tolist(), 24]
+    pieces = [list(piece) for piece in itertools.pairwise(ends)]
+    breaks = np.array([0, ends[1], 24]) if broken else np.array([0, 24])
+    found = settled(np.array(pieces), beams.sums, breaks, RULES)
+    for _ in range(len(beams.sums)):
+        moved = [piece.copy() for piece in pieces]
+        for k, (one, other) in enumerate(itertools.pairwise(pieces)):
+            if one[1] in breaks:
+                continue
+            spare = [(piece[1] - piece[0] - CONFIG.least_beams) // 2 for piece in (one, other)]
+            tried = range(one[1] - spare[0], one[1] + spare[1] + 1)
+            moved[k][1] = moved[k + 1][0] = min(tried, key=lambda at: beams.chi2(one[0], at) + beams.chi2(at, other[1]))
+        pieces = moved
+    assert found.tolist() == pieces
 
 
 @given(seed=seeds)
