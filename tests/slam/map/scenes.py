@@ -1,4 +1,4 @@
-"""Walls that bend or step, noisy scans of them, and drives past them."""
+"""Walls that bend or step, noisy scans of them, drives past them, and beams that cross lines."""
 
 import numpy as np
 
@@ -43,3 +43,16 @@ def drive(poses, seen, backend, config, sigmas):
             mapper.predict(Odometry(compose(inverse(poses[k - 1]), poses[k]), np.diag(sigmas) ** 2))
         updates.append(mapper.step(scan))
     return updates
+
+
+def crossing(bearing_rad, passed_m, pose, anchor, alpha, d=0.0):
+    """Return where one beam crosses a line, m from its anchor, and how far it goes on across it; NaN where it does not.
+
+    A line is crossed from its free side, and by no beam within 3 degrees of it.
+    """
+    n, t = np.array([np.cos(alpha), np.sin(alpha)]), np.array([-np.sin(alpha), np.cos(alpha)])
+    beam = np.array([np.cos(bearing_rad + pose[2]), np.sin(bearing_rad + pose[2])])
+    before = d - n @ (pose[:2] - anchor)
+    if before <= 0.0 or beam @ n <= 0.05:
+        return np.nan, np.nan
+    return t @ (pose[:2] + before / (beam @ n) * beam - anchor), n @ (passed_m * beam) - before

@@ -3,14 +3,38 @@
 from itertools import pairwise
 
 import numpy as np
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainslam.slam.geometry.poses import to_world
-from chainslam.slam.map.kernels.extent_kernels import CORNER, OCCLUDED, kept_piece, note_whole, seen_along, stretch
+from chainslam.slam.map.kernels.extent_kernels import (
+    CORNER,
+    OCCLUDED,
+    contradict,
+    kept_piece,
+    note_whole,
+    seen_along,
+    stretch,
+)
+from tests.slam.map.scenes import crossing
 
 few = settings(max_examples=60, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
+
+
+def left_of(extent, through, on, trim_m):
+    """Return what is left of a wall between the beams that pass through it, some others of which end on it."""
+    bounds = [extent[0], *sorted(through), extent[1]]
+    pieces = [(np.sum((on >= low) & (on < high)), high - low, low, high) for low, high in pairwise(bounds)]
+    _, _, low, high = max(pieces, key=lambda piece: piece[:2])
+    inner = on[(on >= low) & (on <= high)]
+    kept = [low, high]
+    if len(inner) and low > extent[0] and inner.min() - low < trim_m:
+        kept[0] = inner.min()
+    if len(inner) and high < extent[1] and high - inner.max() < trim_m:
+        kept[1] = inner.max()
+    return kept
 
 
 @few
@@ -20,16 +44,7 @@ def test_what_is_left_of_a_wall_is_the_piece_that_most_beams_end_on(seed):
     extent = np.array([-1.0, 2.0])
     through = rng.uniform(-0.9, 1.9, rng.integers(1, 5))
     on = np.round(rng.uniform(-0.9, 1.9, rng.integers(0, 9)), 1)
-    bounds = [-1.0, *sorted(through), 2.0]
-    pieces = [(np.sum((on >= low) & (on < high)), high - low, low, high) for low, high in pairwise(bounds)]
-    _, _, low, high = max(pieces, key=lambda piece: piece[:2])
-    inner = on[(on >= low) & (on <= high)]
-    expected = [low, high]
-    if len(inner) and low > -1.0 and inner.min() - low < 0.5:
-        expected[0] = inner.min()
-    if len(inner) and high < 2.0 and high - inner.max() < 0.5:
-        expected[1] = inner.max()
-    np.testing.assert_array_equal(kept_piece(extent, through, on, 0.5), expected)
+    np.testing.assert_array_equal(kept_piece(extent, through, on, 0.5), left_of(extent, through, on, 0.5))
 
 
 @few
@@ -65,3 +80,42 @@ def test_ends_move_out_to_what_is_seen_and_in_to_a_sharper_corner(seed):
         with np.errstate(invalid="ignore"):
             grown = np.any(np.abs(extents[row] - before[row]) > 0.1)
         assert whole[row] == (0 if grown else count[row]) + seen_whole
+
+
+@few
+@given(seed=seeds)
+def test_walls_within_range_are_cut_back_once_scan_after_scan_goes_through_them(seed):
+    rng = np.random.default_rng(seed)
+    pose, bearings = rng.uniform(-2.0, 2.0, 3), np.linspace(-np.pi, np.pi, 60, endpoint=False)
+    ranges = np.where(rng.random(60) < 0.2, np.inf, rng.uniform(0.3, 3.0, 60))
+    passed = np.where(np.isfinite(ranges), ranges, 3.0 * (rng.random(60) < 0.5))
+    means = np.column_stack([rng.uniform(-3.0, 3.0, 4), rng.uniform(-0.2, 0.2, 4)])
+    normal = np.column_stack([np.cos(means[:, 0]), np.sin(means[:, 0])])
+    anchors = pose[:2] + rng.uniform(-0.3, 2.5, (4, 1)) * normal + rng.normal(0.0, 0.2, (4, 2))
+    extents, spacing = np.sort(rng.uniform(-1.0, 1.0, (4, 2)), axis=1), rng.uniform(0.0, 0.2, (4, 2))
+    against, beams = rng.integers(0, 3, 4), np.zeros(4, dtype=int)
+    was = extents, spacing, against
+    ends, apart, scans = (one.copy() for one in was)
+    for k, (low, high) in enumerate(extents):
+        t = np.array([-normal[k, 1], normal[k, 0]])
+        wall = shapely.LineString(anchors[k] + means[k, 1] * normal[k] + extents[k][:, None] * t)
+        if wall.distance(shapely.Point(pose[:2])) >= 2.0:
+            continue
+        through, on, inside_m = [], [], min(0.2, (high - low) / 4.0)
+        for bearing, range_m, passed_m in zip(bearings, ranges, passed, strict=True):
+            along, across = crossing(bearing, passed_m, pose, anchors[k], *means[k])
+            beams[k] += low < along < high and across >= -0.1
+            if low + inside_m < along < high - inside_m:
+                if across > 0.2:
+                    through.append(along)
+                elif across >= -0.2 and np.isfinite(range_m):
+                    on.append(along)
+        scans[k] = scans[k] + 1 if through else 0
+        if scans[k] >= 2:
+            ends[k], scans[k] = left_of(extents[k], through, np.array(on), 0.15), 0
+            apart[k] = np.where(ends[k] == extents[k], apart[k], 0.2)
+    found = contradict(bearings, ranges, passed, 2.0, pose, anchors, means, *was, 0.1, 0.2, 0.15, 2)
+    np.testing.assert_array_equal(found, beams)
+    np.testing.assert_allclose(extents, ends, atol=1e-12)
+    np.testing.assert_array_equal(spacing, apart)
+    np.testing.assert_array_equal(against, scans)

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from chainslam.slam.estimation.backend import Belief
 from chainslam.slam.estimation.shared import SharedConfig
@@ -10,6 +12,7 @@ from chainslam.slam.geometry.lines import directions
 from chainslam.slam.map.kernels.profile_kernels import (
     breaks_of_beams,
     faces_off,
+    keep_surest,
     misfits,
     places_between,
     surest,
@@ -122,6 +125,30 @@ def test_a_break_has_a_step_and_a_turn_only_where_one_alone_explains_much_less(s
     if left[alone][0] - left["both"][0] > least:
         expected = left["both"][1]
     np.testing.assert_allclose([at, step, turn, ratio], [0, *expected, left["none"][0] - left["both"][0]], rtol=1e-6)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32))
+def test_the_likeliest_break_is_kept_where_it_is_likely_enough(seed):
+    """Each place by a dense solution; one of which beams tell no step from a turn has no break."""
+    rng = np.random.default_rng(seed)
+    begin, sums, likeliest, best = int(rng.integers(-9, 9)), np.zeros((5, rng.integers(1, 7))), np.zeros(5), 0.0
+    for p in range(sums.shape[1]):
+        root = rng.standard_normal((2, rng.integers(0, 4)))
+        info = root @ root.T
+        told = info @ rng.normal(0.0, 2.0, 2)
+        sums[:, p] = info[0, 0], info[0, 1], info[1, 1], *told
+        if root.shape[1] < 2 or np.linalg.det(info) <= 1e-6 * info[0, 0] * info[1, 1]:
+            continue
+        both = np.linalg.solve(info, told)
+        if told @ both > max(best, 5.0):
+            best, alone = told @ both, told**2 / np.diag(info)
+            one = np.where(np.arange(2) == np.argmax(alone), told / np.diag(info), 0.0)
+            found = both if best - max(alone) > 5.0 else one
+            likeliest[:] = 0.05 * (begin + p), *found, 0.05 * begin, 0.05 * (begin + sums.shape[1] - 1)
+    broken = rng.standard_normal(5)
+    keep_surest(sums, begin, 0.05, 5.0, broken)
+    np.testing.assert_allclose(broken, likeliest, rtol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(9))

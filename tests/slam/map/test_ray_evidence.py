@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.extraction.config import ExtractionConfig
@@ -10,7 +12,7 @@ from chainslam.slam.extraction.extract import extract
 from chainslam.slam.extraction.segments import EndKind
 from chainslam.slam.extraction.visible_extent import sure_pieces
 from chainslam.slam.geometry.lines import normals, through
-from chainslam.slam.map.kernels.ray_evidence import ray_evidence
+from chainslam.slam.map.kernels.ray_evidence import RayEvidence, ray_evidence
 from chainslam.slam.robot import Scan
 
 
@@ -71,6 +73,22 @@ def test_each_beam_hits_passes_or_falls_short_as_a_ray_traced_alone_does(seed):
             assert hits[i, k] == (np.isfinite(here) and abs(across) <= margin)
             compared += 1
     assert compared > 20
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32))
+def test_which_beams_end_on_lines_and_which_cross_them_well_inside_of_walls(seed):
+    """In quarters of a metre, so that many lie on a bound."""
+    rng = np.random.default_rng(seed)
+    along, across = rng.integers(-5, 6, (2, 3, 7)) / 4.0
+    along[:, 0] = across[:, 0] = np.nan
+    extents, rays = rng.integers(-5, 6, (3, 2)) / 4.0, RayEvidence(along, across, rng.random(7) < 0.7)
+    hits, inside, between = rays.hits(0.5), rays.between(extents, 0.25), rays.between(extents)
+    for line, (low, high) in enumerate(extents):
+        for beam, (at, beyond) in enumerate(zip(along[line], across[line], strict=True)):
+            assert hits[line, beam] == (rays.returned[beam] and -0.5 <= beyond <= 0.5)
+            assert inside[line, beam] == (at > low + 0.25 and at < high - 0.25)
+            assert between[line, beam] == (at > low and at < high)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainslam.slam.map.kernels.record_kernels import rows_of
-from chainslam.slam.map.kernels.reliability_kernels import add_lengths, as_told, off_line_cov
+from chainslam.slam.map.kernels.reliability_kernels import add_lengths, as_told, lack_of_fit, off_line_cov, off_lines
 
 few = settings(max_examples=50, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
@@ -24,6 +24,41 @@ def scene(seed):
         ends=rng.uniform(-1.0, 1.0, (m, 2, 2)),
         tentative=rng.random(m) < 0.5,
     )
+
+
+def edge(variance, over_m, middle):
+    """Return the covariance of a line that is off across itself by so much, its middle so far along it."""
+    lever = np.array([1.0, middle])
+    return 12.0 * variance / max(over_m, 1e-3) ** 2 * np.outer(lever, lever) + np.diag([0.0, variance])
+
+
+def off_by(extent, longest, across, drawn):
+    """Return how far a wall may be from its line, an edge of which is off by 0.01 m, a face of 0.2 m by half of it."""
+    length = min(np.ptp(extent), min(seen for seen in longest if seen > 0.0))
+    short = (0.01 / (1.0 + (length / 0.2) ** 4)) ** 2
+    return edge(short, length, extent.mean()) + edge(across, np.ptp(drawn), drawn.mean())
+
+
+def broken_walls(seed):
+    """Return extents of six walls and what is known of their breaks: a step, a turn, both or none."""
+    rng = np.random.default_rng(seed)
+    extents, seen = np.sort(rng.uniform(-2.0, 2.0, (2, 6, 2)), axis=2)
+    breaks = rng.normal(0.0, 0.1, (6, 2)) * (rng.random((6, 2)) < 0.7)
+    return rng, extents, np.column_stack([rng.uniform(-2.0, 2.0, 6), breaks, seen])
+
+
+def misfit(broken, extent):
+    """Return over what the line of a wall was drawn, and its misfit: by quadrature over its two faces, m^2."""
+    place, step, turn, first, last = broken
+    low, high = min(first, extent[0]), max(last, extent[1])
+    if not low < place < high:
+        return np.array([low, high]), 0.0
+    x, weights = np.polynomial.legendre.leggauss(3)
+    half = 0.5 * np.diff([low, place, high])[:, None]
+    at, weight = (np.array([[low], [place]]) + half * (1.0 + x)).ravel(), (half * weights).ravel()
+    faces = step * (at > place) + turn * np.maximum(at - place, 0.0)
+    off = faces - np.polynomial.Polynomial.fit(at, faces, 1, w=np.sqrt(weight))(at)
+    return np.array([low, high]), 4.0 * weight @ off**2 / (high - low)
 
 
 @few
@@ -48,16 +83,30 @@ def test_a_wall_is_off_its_line_by_its_misfit_and_where_it_is_short(seed):
     drawn = extents + rng.uniform(0.0, 1.0, (5, 2)) * [-1.0, 1.0]
     off = off_line_cov(extents, longest, across, drawn, 0.01, 0.2)
     for row in range(5):
-        length = min(np.ptp(extents[row]), min(seen for seen in longest[row] if seen > 0.0))
-        short = (0.01 / (1.0 + (length / 0.2) ** 4)) ** 2
-        expected = np.zeros((2, 2))
-        for variance, over_m, middle in (
-            (short, length, extents[row].mean()),
-            (across[row], np.ptp(drawn[row]), drawn[row].mean()),
-        ):
-            lever = np.array([1.0, middle])
-            expected += 12.0 * variance / max(over_m, 1e-3) ** 2 * np.outer(lever, lever) + np.diag([0.0, variance])
-        np.testing.assert_allclose(off[row], expected, rtol=1e-9)
+        np.testing.assert_allclose(off[row], off_by(extents[row], longest[row], across[row], drawn[row]), rtol=1e-9)
+
+
+@few
+@given(seed=seeds)
+def test_a_broken_wall_is_off_its_line_by_the_misfit_of_its_faces(seed):
+    rng, extents, broken = broken_walls(seed)
+    longest = np.sort(rng.uniform(0.01, 2.0, (6, 2)) * (rng.random((6, 2)) < [0.7, 1.0]), axis=1)
+    crooked, off = off_lines(extents, longest, broken, 0.01, 0.2)
+    for row, (low, high) in enumerate(extents):
+        assert crooked[row] == (broken[row, 1:3].any() and low < broken[row, 0] < high)
+        drawn, across = misfit(broken[row], extents[row])
+        np.testing.assert_allclose(off[row], off_by(extents[row], longest[row], across, drawn), rtol=1e-6, atol=1e-15)
+
+
+@few
+@given(seed=seeds)
+def test_a_segment_lacks_fit_by_the_misfit_of_its_wall_about_its_own_middle(seed):
+    rng, extents, broken = broken_walls(seed)
+    lines, ends = rng.uniform(-3.0, 3.0, (6, 2)), rng.uniform(-2.0, 2.0, (6, 2, 2))
+    for row, found in enumerate(lack_of_fit(lines, ends, broken, extents)):
+        drawn, across = misfit(broken[row], extents[row])
+        middle = ends[row].mean(axis=0) @ [-np.sin(lines[row, 0]), np.cos(lines[row, 0])]
+        np.testing.assert_allclose(found, edge(across, np.ptp(drawn), middle), rtol=1e-6, atol=1e-15)
 
 
 @few
