@@ -29,7 +29,7 @@ class RayEvidence:
         return self.across > margin_m
 
     def between(self, extents: Float[np.ndarray, "n 2"], inside_m: float = 0.0) -> Bool[np.ndarray, "n k"]:
-        """Return which beams cross each line between the ends of its wall, by so much or more inside of them."""
+        """Return which beams cross each line between the ends of its wall, by more than so much inside of them."""
         return (extents[:, :1] + inside_m < self.along) & (self.along < extents[:, 1:] - inside_m)
 
     def reaching(self, extents: Float[np.ndarray, "n 2"], margin_m: float) -> Int[np.ndarray, " n"]:
