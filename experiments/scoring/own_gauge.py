@@ -14,8 +14,8 @@ from chainslam.slam.evaluation.consistency import pose_errors
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.geometry.poses import J, to_robot, wrap
 
-DAMPING_MAX = 1e6
-"""With this damping, in units of the squared columns, no step reduces the error further: it is minimal."""
+ROUNDING = 1e-15
+"""The search for the least error ends at a relative change of this."""
 
 
 @dataclass(frozen=True)
@@ -74,22 +74,18 @@ def _nearest_frame(
     true_lines_world: Float[np.ndarray, "m 2"],
     white: Float[np.ndarray, "s s"],
 ) -> Float[np.ndarray, "3"]:
-    """Return the frame of least squared error: Levenberg and Marquardt, damped by the size of each column.
+    """Return the frame of least squared error; `white` is the inverse of the Cholesky factor of the covariance."""
+    from scipy.optimize import least_squares  # 0.2 s to import, which only those who score need wait for.
 
-    `white` is the inverse of the Cholesky factor of the covariance. scipy.optimize takes 0.2 s to import.
-    """
-    walls = (means, anchors_world, true_lines_world, white)
-    at, error, damping = start, _off(start, *walls), 1e-3
-    while damping < DAMPING_MAX:
-        by_frame = _by_motion(true_lines_world[:, 0] + at[2], anchors_world - at[:2], white)
-        damped = np.vstack([by_frame, np.diag(np.sqrt(damping) * np.linalg.norm(by_frame, axis=0))])
-        step = np.linalg.lstsq(damped, np.append(error, np.zeros(3)), rcond=None)[0]
-        new = _off(at + step, *walls)
-        if new @ new >= error @ error:
-            damping *= 10.0
-            continue
-        at, error, damping = at + step, new, 0.1 * damping
-    return at
+    def by_frame(at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "s 3"]:
+        return -_by_motion(true_lines_world[:, 0] + at[2], anchors_world - at[:2], white)
+
+    def off(at: Float[np.ndarray, "3"]) -> Float[np.ndarray, " s"]:
+        return _off(at, means, anchors_world, true_lines_world, white)
+
+    found = least_squares(off, start, by_frame, method="lm", x_scale="jac", ftol=ROUNDING, xtol=ROUNDING, gtol=ROUNDING)
+    frame: np.ndarray = found.x
+    return frame
 
 
 def _off(

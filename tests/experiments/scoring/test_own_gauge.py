@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.optimize import least_squares
@@ -42,6 +42,7 @@ def moved(anchors, means, shift, turn):
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10**6), st.floats(-3.0, 3.0), st.floats(-40.0, 40.0), st.floats(-40.0, 40.0))
+@example(505126, -9e-162, -25.809669063446293, -6.785777959892087)  # About this least error undamped steps swing.
 def test_turning_and_shifting_the_whole_map_changes_nothing_but_its_frame(seed, turn, x, y):
     rng = np.random.default_rng(seed)
     anchors, true, cov = walls_of(rng)
