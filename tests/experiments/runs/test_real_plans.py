@@ -35,7 +35,7 @@ def test_a_real_building_is_explored_to_its_end(name, contours):
     assert summary["collisions"] == summary["false_merges"] == summary["duplicate_lines"] == 0
     # Where the robot looks around it may see six beams of a wall that turns by two degrees, of its other side.
     votes = result.votes
-    assert votes.false_matches() <= len(votes.fused) / 100
+    assert votes.false_matches() <= len(votes.fused) / 50
     assert sum(not is_bend(votes.truth, *pair) for pair in false_pairs(votes)) <= len(votes.fused) / 400
 
 
