@@ -140,7 +140,12 @@ def difference(pairs: Float[np.ndarray, "n 2"], measure: Measure) -> tuple[float
         return None
     if measure.is_ratio:
         return mean, f"{100.0 * np.expm1(mean):+.1f} % ± {100.0 * error:.1f}"
-    return mean, f"{mean:+.2g} ± {error:.1g}"
+    return mean, f"{_rounded(mean, 2, sign=True)} ± {_rounded(error, 1)}"
+
+
+def _rounded(value: float, digits: int, sign: bool = False) -> str:
+    """Return a number to so many digits, without an exponent."""
+    return np.format_float_positional(value, digits, unique=False, fractional=False, trim="-", sign=sign)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from chainslam.experiments.usage import UsageError
 from studies.runner.rows import HERE, append, fingerprint, read
 from studies.weights.mechanisms import BASELINE, MECHANISMS, Edit, Mechanism
 from studies.weights.run import WeightsRun, copied, driven, drop_replaced
-from studies.weights.table import ROWS, SCORES, difference, newest, table, verdict
+from studies.weights.table import ROWS, SCORES, Measure, difference, newest, table, verdict
 
 MODULE, PIECE = "slam.extraction.straightness_kernels", "return (edge_m / (1.0 + (length_m / face_m) ** 4)) ** 2"
 OFF = Mechanism("short faces", "stated unsure", (Edit(MODULE, PIECE, "return 0.0"),))
@@ -182,3 +182,8 @@ def test_uneven_apartments_are_drawn_and_run_to_their_ends(tmp_path, monkeypatch
     assert max_steps == 5_000
     assert not again
     assert len(free.exterior.coords) > len(load_world(str(tmp_path / "lifull_0.json")).free.exterior.coords)
+
+
+def test_a_large_difference_is_told_without_an_exponent():
+    more = np.array([-48.0, -108.0, -78.0, -138.0, -18.0])
+    assert difference(np.column_stack([np.zeros(5), more]), Measure("false matches", -1.0))[1] == "-78 ± 20"
