@@ -52,10 +52,14 @@ def program() -> str:
 
 def _guarded(client: Any, address: str, performed: Iterator[Done]) -> Iterator[Done]:
     """Run the jobs, and raise ClusterError in place of whatever a failing cluster raises."""
+    from distributed.comm import CommClosedError
+
     try:
         yield from performed
     except (CancelledError, OSError, RuntimeError) as error:
-        if isinstance(error, ClusterError) or client.status == "running":
+        # The client may go on calling itself running for a while after its connection has closed.
+        is_gone = isinstance(error, CommClosedError) or client.status != "running"
+        if isinstance(error, ClusterError) or not is_gone:
             raise
         raise ClusterError(
             f"expected the Dask scheduler at {address} to keep running, found it gone: start it and its workers again"
@@ -64,6 +68,7 @@ def _guarded(client: Any, address: str, performed: Iterator[Done]) -> Iterator[D
 
 def _perform_all(client: Any, address: str, performs: Callable[[Job], Done], jobs: Iterable[Job]) -> Iterator[Done]:
     from distributed import KilledWorker
+    from distributed.comm import CommClosedError
 
     _check(client, address)
     waiting, sent = iter(jobs), dict[Any, Job]()
@@ -79,7 +84,7 @@ def _perform_all(client: Any, address: str, performs: Callable[[Job], Done], job
                 done = future.result()
             except KilledWorker as error:
                 done = lost(job, f"its worker died: {error}")
-            except CancelledError:
+            except (CancelledError, CommClosedError):
                 raise
             except Exception as error:  # errors of the trial itself are in its record
                 raise _unable(address, error) from error

@@ -7,9 +7,11 @@ import subprocess
 import sys
 import time
 from itertools import count
+from types import SimpleNamespace
 
 import distributed
 import pytest
+from distributed.comm import CommClosedError
 
 from chainslam.experiments.campaign import cluster as of_dask
 from chainslam.experiments.campaign.cluster import on_dask
@@ -135,3 +137,13 @@ def test_what_is_finished_is_kept_when_the_cluster_dies(started, tmp_path, capsy
     assert compared(address, tmp_path / "out", 6) == 1
     told_in_one_line(capsys, "found it gone" if killed == "scheduler" else "found none in 3 s")
     assert len(list((tmp_path / "out" / "trials").rglob("*.npz"))) >= 1
+
+
+def test_a_closed_connection_is_a_scheduler_gone_though_the_client_has_not_noticed():
+    def closed():
+        raise CommClosedError("the stream is closed")
+        yield
+
+    client = SimpleNamespace(status="running")
+    with pytest.raises(of_dask.ClusterError, match="found it gone"):
+        list(of_dask._guarded(client, "tcp://127.0.0.1:1", closed()))
