@@ -8,6 +8,7 @@ import sys
 import time
 from itertools import count
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import distributed
 import pytest
@@ -147,3 +148,18 @@ def test_a_closed_connection_is_a_scheduler_gone_though_the_client_has_not_notic
     client = SimpleNamespace(status="running")
     with pytest.raises(of_dask.ClusterError, match="found it gone"):
         list(of_dask._guarded(client, "tcp://127.0.0.1:1", closed()))
+
+
+def test_a_connection_that_closes_under_a_result_is_no_worker_without_the_package(monkeypatch):
+    def closed():
+        raise CommClosedError("the stream is closed")
+
+    client = SimpleNamespace(
+        wait_for_workers=lambda count, timeout: None,
+        run=lambda asked: {"worker": asked()},
+        nthreads=lambda: {"worker": 1},
+        submit=lambda *job, pure: MagicMock(result=closed),
+    )
+    monkeypatch.setattr(of_dask, "_some_done", lambda client, address, futures: futures)
+    with pytest.raises(CommClosedError):
+        list(of_dask._perform_all(client, "tcp://127.0.0.1:1", print, [None]))

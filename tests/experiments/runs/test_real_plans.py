@@ -1,5 +1,6 @@
 """Missions in the two real buildings that come with the tests."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -25,18 +26,34 @@ def test_the_first_metres_in_a_real_building_go_well(name):
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "contours"), [("apartment", 2), ("school", 3)])
 def test_a_real_building_is_explored_to_its_end(name, contours):
-    config = TrialConfig(str(PLANS / f"{name}.json"), "invariant-ekf", errorless=True)
-    result = run_trial(config)
+    result = errorless(name)
     summary = result.summary
     assert summary["status"] == "complete"
     assert summary["contours_closed"] == summary["contours_reachable"] == contours
     assert summary["coverage"] > 0.97
     assert summary["swept"] > 0.99
     assert summary["collisions"] == summary["false_merges"] == summary["duplicate_lines"] == 0
-    # Where the robot looks around it may see six beams of a wall that turns by two degrees, of its other side.
     votes = result.votes
-    assert votes.false_matches() <= len(votes.fused) / 50
     assert sum(not is_bend(votes.truth, *pair) for pair in false_pairs(votes)) <= len(votes.fused) / 400
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "name",
+    [
+        "apartment",
+        pytest.param("school", marks=pytest.mark.xfail(strict=True, reason="90 of 6,661 at three bends: misses.md")),
+    ],
+)
+def test_few_segments_are_matched_to_the_other_side_of_a_bend(name):
+    """Where the robot looks around it may see six beams of a wall that turns by two degrees, of its other side."""
+    votes = errorless(name).votes
+    assert votes.false_matches() <= len(votes.fused) / 100
+
+
+@cache
+def errorless(name):
+    return run_trial(TrialConfig(str(PLANS / f"{name}.json"), "invariant-ekf", errorless=True))
 
 
 def false_pairs(votes):
