@@ -26,7 +26,7 @@ for each in loaded:
 
 @pytest.mark.skipif(" avx2 " not in CPU, reason="this processor lacks the kernel, or is told of by no file")
 @pytest.mark.parametrize(
-    "first", ["import chainslam.experiments", "import studies.runner.rows", "import tests.arithmetic"]
+    "first", ["import chainslam.experiments", "import studies.paper.following", "import tests.arithmetic"]
 )
 @pytest.mark.parametrize("chosen", [{}, {"OPENBLAS_CORETYPE": "Nehalem"}])
 def test_one_kernel_sums_on_every_processor_that_has_it_unless_another_is_chosen(first, chosen):
