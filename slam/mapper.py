@@ -161,7 +161,6 @@ class Mapper:
             self._is_lost = self.config.recovery is not None  # Else nobody would look for its place.
             return self._nothing_taken_in(segments, self._keeper.map())
         self._left_out = 0
-        self._keeper.follow()
         walls, owners, merged = self._keeper.store(scan, segments, matches)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         self._chains = connect(walls, set_aside, self.config.shared)
@@ -226,8 +225,7 @@ class Mapper:
             pose_cov = pose_cov + unstated_cov(self.config.recovery)
         if self._method.looks_near:
             near = near[near_segments(segments, walls.ends_world.take(near, 0), belief.pose_world, pose_cov, config)]
-        whole = None if walls.whole is None else walls.whole.take(near)
-        known = KnownWalls(walls.ids.take(near), walls.extents.take(near, 0), whole)
+        known = KnownWalls(walls.ids.take(near), walls.extents.take(near, 0))
         return View(segments, known, self.backend.belief.joint(known.ids), self._method, config)
 
     def _observed(self, matches: Matches, segments: Segments) -> Observations:

@@ -44,7 +44,7 @@ METHODS: dict[str, MethodPreset] = {
         backend="block-ekf",
         mapper=(
             (MATCHING, "paper"),
-            ("mission.mapper.merging", None),
+            ("mission.mapper.merging", False),
         ),
         driving=((FOLLOWING, "paper"), (NAVIGATION, "visibility"), (SWEEP, False)),
     ),

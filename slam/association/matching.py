@@ -66,7 +66,6 @@ class MatchingConfig:
             float(self.beside_rad),
             float(self.density),
             float(shared.beside_m),
-            float(shared.face_m),
             float(shared.short_m),
             float(shared.far_m),
         )
@@ -112,8 +111,6 @@ class KnownWalls:
     """Ascending."""
     extents: Float[np.ndarray, "n 2"]
     """From and to along the line, m from the anchor."""
-    whole: Bool[np.ndarray, " n"] | None = None
-    """Walls that are known to reach no farther; None where that is not known of any."""
 
 
 def match(
@@ -134,8 +131,7 @@ def match(
         return replace(NO_MATCHES, unmatched=np.arange(count))
     limits, together = config.limits, pair_levels(config.doubt, count)
     seen = Seen(segments.lines, segments.cov, segments.ends, segments.is_tentative)
-    whole = np.zeros(len(ids), dtype=bool) if walls.whole is None else walls.whole
-    known = Known(joint.mean, np.ascontiguousarray(joint.cov), joint.anchors, walls.extents, whole)
+    known = Known(joint.mean, np.ascontiguousarray(joint.cov), joint.anchors, walls.extents)
     pairs, distances, doubtful, found = matched(seen, known, limits, together, clear_only)
     is_matched = np.zeros(count, dtype=bool)
     is_matched[pairs[:, 0]] = True

@@ -1,7 +1,6 @@
 """What extraction hands to matching: the straight pieces of one scan."""
 
 from dataclasses import dataclass, replace
-from enum import IntEnum
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -9,17 +8,6 @@ from jaxtyping import Bool, Float, Int
 from ..geometry.lines import directions, normals
 from ..geometry.poses import to_world
 from ..robot import ScannerSpec
-
-
-class EndKind(IntEnum):
-    """Why a segment ends where it does."""
-
-    OPEN = 0
-    """The scan has no return beyond (out of range or a gap)."""
-    OCCLUDED = 1
-    """Something nearer hides what comes next."""
-    CORNER = 2
-    """The next segment of the same scan begins here; the end is the intersection of the two lines."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +24,8 @@ class Segments:
     """First and last beam index; first > last where the segment crosses the scan's seam."""
     beam_counts: Int[np.ndarray, " n"]
     """Number of beams that the fit used."""
-    end_kinds: Int[np.ndarray, "n 2"]
-    """An `EndKind` for each end."""
+    at_corner: Bool[np.ndarray, "n 2"]
+    """Whether the next segment of the same scan begins at an end: then it is where their lines cross."""
     chi2: Float[np.ndarray, " n"]
     """Squared residuals of the beams over the squared noise, summed: `beam_counts` - 2 degrees of freedom. With few
     beams up to twice as much: the last ones, which count less in the fit (`end_share`), lie farther off it."""
@@ -72,7 +60,7 @@ class Segments:
             self.ends.take(rows, 0),
             self.beams.take(rows, 0),
             self.beam_counts.take(rows),
-            self.end_kinds.take(rows, 0),
+            self.at_corner.take(rows, 0),
             self.chi2.take(rows),
             self.is_tentative.take(rows),
         )

@@ -12,14 +12,14 @@ def sure_pieces(segments: Segments, scan: Scan, config: ExtractionConfig) -> Seg
     A segment that lies beyond altogether keeps the end nearer to the foot of the perpendicular. Corners far beyond the
     last beam are not believed either.
     """
-    ends, end_kinds = believed_ends(
+    ends, at_corner = believed_ends(
         segments.lines,
         segments.ends,
-        segments.end_kinds,
+        segments.at_corner,
         scan.bearings_rad[segments.beams],
         scan.step_rad,
         float(config.shared.door_m),
         float(config.shared.within_m),
     )
     lines, cov, beams, counts = segments.lines, segments.cov, segments.beams, segments.beam_counts
-    return Segments(lines, cov, ends, beams, counts, end_kinds, segments.chi2, segments.is_tentative)
+    return Segments(lines, cov, ends, beams, counts, at_corner, segments.chi2, segments.is_tentative)

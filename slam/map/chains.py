@@ -1,6 +1,5 @@
 """Segments joined end to end: chains, their open ends, closed contours (paper, sections 2 and 2.2)."""
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import pairwise
@@ -81,8 +80,7 @@ def _aside(ids: Int[np.ndarray, " n"], set_aside: Collection[tuple[int, int]]) -
 
 
 def _reach(shared: SharedConfig) -> Reach:
-    straight_cosine = math.cos(shared.straight_rad)
-    return Reach(float(shared.thickness_m), float(shared.door_m), straight_cosine, float(shared.within_m))
+    return Reach(float(shared.thickness_m), float(shared.door_m))
 
 
 def _chain(

@@ -10,9 +10,7 @@ from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..robot import Scan
-from .displacement import along
 from .existence import JUST_BEGUN, ExistenceConfig
-from .kernels import wall_kernels
 from .kernels.existence_kernels import look
 from .kernels.extent_kernels import contradict, take_in
 from .records import Merger, Records
@@ -54,27 +52,12 @@ class Extents:
         self._records.declare(
             self._merge,
             extents=np.array([np.inf, -np.inf]),
-            placed=np.full(2, np.nan),
             spacing=np.full(2, np.inf),
             observations=0,
             against=0,
-            whole=0,
             log_odds=self._believed,
             place=JUST_BEGUN,
         )
-
-    def follow(self, belief: Belief) -> None:
-        """Move extents along with the map, where long walls have moved by more than ends are known to."""
-        columns, shared = self._records.columns, self._config.shared
-        self._records.rows(belief.ids)
-        placed, extents, long_m = columns["placed"], columns["extents"], float(shared.long_m)
-        tell, ends_world, moved_m = wall_kernels.moved(placed, extents, belief.anchors, belief.means, long_m)
-        if not len(tell) or np.abs(moved_m).max() <= shared.resolution_m:
-            return
-        seen = np.flatnonzero(extents[:, 0] <= extents[:, 1])
-        middles = wall_kernels.ends_world(belief.anchors[seen], placed[seen], extents[seen]).mean(axis=1)
-        extents[seen] += along(middles, placed[seen, 0], ends_world, placed[tell, 0], moved_m, long_m)[:, None]
-        placed[:] = belief.means
 
     def map(
         self,
@@ -85,8 +68,8 @@ class Extents:
         """Return the belief together with the extents, and how far walls may be from their lines."""
         columns = self._records.columns
         extents, observations = columns["extents"].copy(), columns["observations"].copy()
-        tentative, whole = columns["log_odds"] <= self._believed, columns["whole"] >= self._config.shared.scans
-        return StochasticMap(belief, extents, observations, tentative, crooked, whole, off_line_cov)
+        tentative = columns["log_odds"] <= self._believed
+        return StochasticMap(belief, extents, observations, tentative, crooked, off_line_cov)
 
     def meet(self, pairs: Int[np.ndarray, "k 2"], along: Float[np.ndarray, "k 2"]) -> None:
         """End the walls of each pair of ids, the one before the other, so far along each, m, where they reach past.
@@ -117,9 +100,9 @@ class Extents:
         """
         columns, shared, margin_m = self._records.columns, self._config.shared, float(self._config.shared.thickness_m)
         extents, spacing, log_odds = columns["extents"], columns["spacing"], columns["log_odds"]
-        seen, lines = (segments.ends, segments.lines, segments.end_kinds, rows), (belief.anchors, belief.means)
-        kept = extents, spacing, columns["whole"], columns["observations"]
-        shown = take_in(*seen, belief.pose_world, *lines, scan.step_rad, *kept, margin_m)
+        seen, lines = (segments.ends, segments.lines, segments.at_corner, rows), (belief.anchors, belief.means)
+        kept = extents, spacing, columns["observations"]
+        shown = take_in(*seen, belief.pose_world, *lines, scan.step_rad, *kept)
         beams = np.zeros(len(extents), dtype=np.int64)
         if self._config.housekeeping:
             rays = scan.bearings_rad, scan.ranges_m, scan.passed_m, float(scan.range_max_m), belief.pose_world, *lines
@@ -145,5 +128,4 @@ class Extents:
                 extents[row, side] = theirs[side]
                 spacing[row, side] = spacing[other, side]
         columns["observations"][row] += columns["observations"][other]
-        columns["whole"][row] = 0
         columns["log_odds"][row] = max(columns["log_odds"][row], columns["log_odds"][other])

@@ -27,8 +27,6 @@ class StochasticMap:
     """Walls that were not seen well enough yet to be followed or chained."""
     crooked: Bool[np.ndarray, " n"]
     """Walls that stand for two faces: all scans together show a break between their ends (`profiles`)."""
-    whole: Bool[np.ndarray, " n"] | None = None
-    """Walls of which scan after scan showed both ends, hidden by nothing: they reach no farther. None where unknown."""
     off_line_cov: Float[np.ndarray, "n 2 2"] | None = None
     """How far each wall may be from its line, as a covariance of (alpha rad, d m): what no single beam's noise explains
     (`straightness`). A back end's own belief has none of it."""

@@ -78,7 +78,7 @@ def step_of(walls, chains, **changes):
     scan = Scan(np.linspace(-np.pi, np.pi, BEAMS, endpoint=False), np.full(BEAMS, 0.5), 0.01, 4.0, 0.0)
     none = np.zeros((0, 2))
     segments = Segments(none, np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), none.astype(int), np.zeros(0, int),
-                        none.astype(int), np.zeros(0), np.zeros(0, bool))  # fmt: skip
+                        none > 0, np.zeros(0), np.zeros(0, bool))  # fmt: skip
     kept = {
         "index": 2, "time_s": 2.0, "odometry": Odometry(np.zeros(3), np.zeros((3, 3))), "scan": scan,
         "segments": segments, "matches": NO_MATCHES, "walls_of_segments": np.zeros(0, int), "map": walls,

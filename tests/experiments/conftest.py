@@ -62,8 +62,8 @@ def segments_of(scan, faces_of_beams, faces, pose):
     beams = np.array([[run[0], run[-1]] for run in runs], dtype=np.int64).reshape(-1, 2)
     count = beams[:, 1] - beams[:, 0] + 1
     cov = np.tile(1e-6 * np.eye(2), (len(runs), 1, 1))
-    kinds = np.zeros((len(runs), 2), dtype=np.int64)
-    return Segments(through(ends), cov, ends, beams, count, kinds, np.zeros(len(runs)), count < 5), owners
+    apart = np.zeros((len(runs), 2), dtype=bool)
+    return Segments(through(ends), cov, ends, beams, count, apart, np.zeros(len(runs)), count < 5), owners
 
 
 def chains_of(faces, rings, closed=True):

@@ -25,8 +25,6 @@ class Limits(NamedTuple):
     density: float
     beside_m: float
     """A short segment so near a wall of which it covers half is not a new wall."""
-    face_m: float
-    """A short wall of which both ends were seen is none of which a segment shows more by this."""
     short_m: float
     """Shorter ones are too poor in direction for the gate alone."""
     far_m: float
@@ -49,7 +47,6 @@ class Known(NamedTuple):
     cov: Float[np.ndarray, "t t"]
     anchors: Float[np.ndarray, "n 2"]
     extents: Float[np.ndarray, "n 2"]
-    whole: Bool[np.ndarray, " n"]
 
 
 class Candidates(NamedTuple):
@@ -85,7 +82,6 @@ def candidates(seen: Seen, known: Known, limits: Limits) -> Candidates:
         low, high = along_line(seen.ends[segment[c]], known.anchors[line[c]], alpha[c], pose)
         gap[c] = gap_to(low, high, known.extents[line[c]])
         near[c] = abs(e[c, 1]) < limits.far_m or d2[c] <= limits.doubt
-        near[c] = near[c] and not _shows_more(low, high, line[c], known, limits)
     return Candidates(segment[near], line[near], e[near], H_pose[near], H_line[near], R[near], d2[near], gap[near])
 
 
@@ -110,14 +106,6 @@ def _share_of_heading(line: int, cov: Float[np.ndarray, "t t"], variance: float)
     at = 3 + 2 * line
     known = cov[2, 2] - 2.0 * cov[2, at] + cov[at, at]
     return known / (known + variance)
-
-
-@compiled
-def _shows_more(low: float, high: float, line: int, known: Known, limits: Limits) -> bool:
-    """Return whether a segment reaches past a short wall of which both ends were seen."""
-    begin, end = known.extents[line]
-    past = max(high - end, begin - low)
-    return known.whole[line] and end - begin < limits.short_m and past > limits.face_m
 
 
 @compiled

@@ -6,14 +6,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ...geometry.compiled import compiled
-from ..segments import EndKind
 from .fit_kernels import Fitted, fitted
 from .joint_kernels import sharpened
 from .line_kernels import crossing, line_of, met_at, polar, prefix_sums
 from .returns_kernels import Returns, Rules, returns_of, rolled, run_of, turn_of, turned
 from .split_kernels import candidates, settled, split, split_gains, surest
-
-_OPEN, _OCCLUDED, _CORNER = int(EndKind.OPEN), int(EndKind.OCCLUDED), int(EndKind.CORNER)
 
 
 class Found(NamedTuple):
@@ -24,7 +21,7 @@ class Found(NamedTuple):
     ends: Float[np.ndarray, "n 2 2"]
     beams: Int[np.ndarray, "n 2"]
     beam_counts: Int[np.ndarray, " n"]
-    end_kinds: Int[np.ndarray, "n 2"]
+    at_corner: Bool[np.ndarray, "n 2"]
     chi2: Float[np.ndarray, " n"]
     is_tentative: Bool[np.ndarray, " n"]
 
@@ -61,7 +58,7 @@ def _described(pieces: Fitted, returns: Returns, rules: Rules) -> tuple[Found, B
     """
     n, m = len(pieces.counts), len(returns.beam)
     lines, cov, ends = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
-    beams, kinds, good = np.empty((n, 2), np.int64), np.empty((n, 2), np.int64), np.ones(n, np.bool_)
+    beams, at_corner, good = np.empty((n, 2), np.int64), np.zeros((n, 2), np.bool_), np.ones(n, np.bool_)
     for k in range(n):
         line = line_of(pieces.lines, k)
         lines[k, 0], lines[k, 1], cov[k, 0, 0], cov[k, 0, 1], cov[k, 1, 1] = polar(line)
@@ -71,7 +68,6 @@ def _described(pieces: Fitted, returns: Returns, rules: Rules) -> tuple[Found, B
             range_m = met_at(line, returns.cos[at], returns.sin[at])
             ends[k, end, 0], ends[k, end, 1] = range_m * returns.cos[at], range_m * returns.sin[at]
             beams[k, end] = returns.beam[at]
-            kinds[k, end] = _OCCLUDED if _is_hidden(pieces, k, end, returns, rules) else _OPEN
             good[k] &= range_m > 0.0
     for k in range(n if returns.is_ring and n > 1 else n - 1):
         after = (k + 1) % n
@@ -79,29 +75,13 @@ def _described(pieces: Fitted, returns: Returns, rules: Rules) -> tuple[Found, B
         if is_corner:
             ends[k, 1, 0], ends[k, 1, 1] = x, y
             ends[after, 0, 0], ends[after, 0, 1] = x, y
-            kinds[k, 1] = kinds[after, 0] = _CORNER
+            at_corner[k, 1] = at_corner[after, 0] = True
     for k in range(n):
         told = cov[k, 0, 0] + cov[k, 0, 1] + cov[k, 1, 1]
         for end in range(2):
             told += ends[k, end, 0] + ends[k, end, 1]
         good[k] &= np.isfinite(told)
-    return Found(lines, cov, ends, beams, pieces.counts, kinds, pieces.chi2, pieces.counts < rules.sure_beams), good
-
-
-@compiled
-def _is_hidden(pieces: Fitted, k: int, end: int, returns: Returns, rules: Rules) -> bool:
-    """Return whether one of the next beams past an end met something nearer than the line would be."""
-    m, line, last = len(returns.beam), line_of(pieces.lines, k), pieces.place[k, end]
-    for step in range(1, rules.gap_beams + 1):
-        beyond = last + (step if end else -step)
-        at = beyond % m
-        turn = returns.turn[at] + returns.period * (beyond // m)
-        if abs(turn - turn_of(last, returns)) > rules.gap_beams:
-            continue
-        inverse = line.a * returns.cos[at] + line.b * returns.sin[at]
-        if inverse * (returns.ranges_m[at] + rules.noise_sigmas * returns.sigmas_m[at]) < 1.0:
-            return True
-    return False
+    return Found(lines, cov, ends, beams, pieces.counts, at_corner, pieces.chi2, pieces.counts < rules.sure_beams), good
 
 
 @compiled

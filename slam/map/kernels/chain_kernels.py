@@ -11,8 +11,6 @@ from ...geometry.line_kernels import intersect
 
 TAIL, HEAD = 0, 1
 """The two ends of a wall: walking from tail to head, the free side is on the left."""
-BESIDE_SHARE = 0.5
-"""Ends of parallel walls that stand apart by this share of the gap across them are a step, not one wall with a hole."""
 
 
 class Reach(NamedTuple):
@@ -22,11 +20,6 @@ class Reach(NamedTuple):
     """Largest distance between two ends that are joined while the robot still explores them."""
     set_aside_reach_m: float
     """The same for two ends that exploration looked at closely and set aside."""
-    straight_cosine: float
-    """Walls that turn less into each other make no corner ..."""
-    straight_reach_m: float
-    """... and join only this near, or beside each other: two rooms' walls on one line face each other across the end of
-    the wall between, as far apart as that is thick."""
 
 
 @compiled
@@ -50,7 +43,7 @@ def linked(
         both_aside[k] = aside[pairs[k, 0], HEAD] and aside[pairs[k, 1], TAIL]
     alpha, lines = means[:, 0].copy(), means.copy()
     lines[:, 1] += np.cos(alpha) * anchors[:, 0] + np.sin(alpha) * anchors[:, 1]
-    gaps, allowed = joinable(pairs, ends, alpha, both_aside, reach)
+    gaps, allowed = joinable(pairs, ends, both_aside, reach)
     successor = successors(pairs, gaps, allowed, len(ends))
     before = np.flatnonzero(successor >= 0)
     after = successor[before]
@@ -92,7 +85,6 @@ def near_ends(ends: Float[np.ndarray, "n 2 2"], reach_m: float) -> Int[np.ndarra
 def joinable(
     pairs: Int[np.ndarray, "k 2"],
     ends: Float[np.ndarray, "n 2 2"],
-    alpha: Float[np.ndarray, " n"],
     both_aside: Bool[np.ndarray, " k"],
     reach: Reach,
 ) -> tuple[Float[np.ndarray, " k"], Bool[np.ndarray, " k"]]:
@@ -102,11 +94,7 @@ def joinable(
         head, tail = pairs[k]
         east, north = ends[tail, TAIL, 0] - ends[head, HEAD, 0], ends[tail, TAIL, 1] - ends[head, HEAD, 1]
         gap = math.hypot(east, north)
-        across = abs(math.cos(alpha[head]) * east + math.sin(alpha[head]) * north)
-        straight = math.cos(alpha[head] - alpha[tail]) > reach.straight_cosine
-        near = gap <= (reach.set_aside_reach_m if both_aside[k] else reach.reach_m)
-        near = near and (not straight or gap <= reach.straight_reach_m or across > BESIDE_SHARE * gap)
-        gaps[k], allowed[k] = gap, near
+        gaps[k], allowed[k] = gap, gap <= (reach.set_aside_reach_m if both_aside[k] else reach.reach_m)
     return gaps, allowed
 
 

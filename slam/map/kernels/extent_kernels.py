@@ -5,14 +5,11 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ...extraction.segments import EndKind
 from ...geometry.compiled import compiled
 from ...geometry.line_kernels import GRAZING
 from ...geometry.numerics import TINY
 from .ray_kernels import crossings, reaching
 from .wall_kernels import distances, ends_world
-
-CORNER, OCCLUDED = int(EndKind.CORNER), int(EndKind.OCCLUDED)
 
 
 @compiled
@@ -61,7 +58,7 @@ def stretch(
     rows: Int[np.ndarray, " m"],
     along: Float[np.ndarray, "m 2"],
     apart: Float[np.ndarray, "m 2"],
-    end_kinds: Int[np.ndarray, "m 2"],
+    at_corner: Bool[np.ndarray, "m 2"],
     extents: Float[np.ndarray, "n 2"],
     spacing: Float[np.ndarray, "n 2"],
 ) -> None:
@@ -73,30 +70,10 @@ def stretch(
             if row < 0:
                 continue
             beyond = outward * (along[k, side] - extents[row, side])
-            sharper = end_kinds[k, side] == CORNER and apart[k, side] < spacing[row, side]
+            sharper = at_corner[k, side] and apart[k, side] < spacing[row, side]
             if beyond > 0.0 or (sharper and -beyond < spacing[row, side]):
                 extents[row, side] = along[k, side]
                 spacing[row, side] = apart[k, side]
-
-
-@compiled
-def note_whole(
-    before: Float[np.ndarray, "n 2"],
-    rows: Int[np.ndarray, " m"],
-    end_kinds: Int[np.ndarray, "m 2"],
-    extents: Float[np.ndarray, "n 2"],
-    whole: Int[np.ndarray, " n"],
-    margin_m: float,
-) -> None:
-    """Count in how many scans nothing hid either end of a wall, since it last turned out to be longer."""
-    for k in range(len(rows)):
-        row = rows[k]
-        grown = abs(extents[row, 0] - before[row, 0]) > margin_m or abs(extents[row, 1] - before[row, 1]) > margin_m
-        if row >= 0 and grown:
-            whole[row] = 0
-    for k in range(len(rows)):
-        if rows[k] >= 0 and end_kinds[k, 0] != OCCLUDED and end_kinds[k, 1] != OCCLUDED:
-            whole[rows[k]] += 1
 
 
 @compiled
@@ -165,7 +142,7 @@ def kept_piece(
 def take_in(
     ends: Float[np.ndarray, "s 2 2"],
     lines: Float[np.ndarray, "s 2"],
-    end_kinds: Int[np.ndarray, "s 2"],
+    at_corner: Bool[np.ndarray, "s 2"],
     rows: Int[np.ndarray, " s"],
     pose_world: Float[np.ndarray, "3"],
     anchors: Float[np.ndarray, "n 2"],
@@ -173,15 +150,11 @@ def take_in(
     step_rad: float,
     extents: Float[np.ndarray, "n 2"],
     spacing: Float[np.ndarray, "n 2"],
-    whole: Int[np.ndarray, " n"],
     observations: Int[np.ndarray, " n"],
-    margin_m: float,
 ) -> Bool[np.ndarray, " n"]:
-    """Stretch the walls in `rows` over the segments of one scan, note which are whole, and return which it shows."""
-    before = extents.copy()
+    """Stretch the walls in `rows` over the segments of one scan, and return which it shows."""
     along, apart = seen_along(ends, lines, rows, pose_world, anchors, means, step_rad)
-    stretch(rows, along, apart, end_kinds, extents, spacing)
-    note_whole(before, rows, end_kinds, extents, whole, margin_m)
+    stretch(rows, along, apart, at_corner, extents, spacing)
     shown = np.zeros(len(extents), np.bool_)
     for row in rows:
         if row >= 0:

@@ -25,7 +25,7 @@ def truth(world):
 
 def segments_of(spans):
     n, none = len(spans), np.zeros((len(spans), 2))
-    return Segments(none, np.zeros((n, 2, 2)), np.zeros((n, 2, 2)), np.array(spans), np.full(n, 5), none.astype(int),
+    return Segments(none, np.zeros((n, 2, 2)), np.zeros((n, 2, 2)), np.array(spans), np.full(n, 5), none > 0,
                     np.zeros(n), np.zeros(n, bool))  # fmt: skip
 
 

@@ -38,7 +38,7 @@ def one_segment(first, last):
         np.zeros((1, 2, 2)),
         np.array([[first, last]]),
         np.array([5]),
-        np.zeros((1, 2), int),
+        np.zeros((1, 2), bool),
         np.zeros(1),
         np.zeros(1, bool),
     )

@@ -26,7 +26,9 @@ def seen(turn_rad=0.0, nearer_m=0.0, sigma_rad=0.01, sigma_m=0.01):
     n, t = np.array([np.cos(turn_rad), np.sin(turn_rad)]), np.array([-np.sin(turn_rad), np.cos(turn_rad)])
     ends = (2.0 - nearer_m) * n + np.array([[-0.5], [0.5]]) * t
     cov = np.diag([sigma_rad, sigma_m])[None] ** 2
-    return Segments(line, cov, ends[None], np.array([[0, 9]]), np.array([10]), np.zeros((1, 2), int), np.zeros(1), SURE)
+    return Segments(
+        line, cov, ends[None], np.array([[0, 9]]), np.array([10]), np.zeros((1, 2), bool), np.zeros(1), SURE
+    )
 
 
 def known(pose_sigmas, line_sigmas, shared=0.0):
@@ -71,7 +73,7 @@ def short(turn_rad, across_m, along_m, length_m):
     cov = np.array([[1.0, t @ centre], [t @ centre, (t @ centre) ** 2]]) * 0.02**2 + np.diag([0.0, 0.005**2])
     line = np.array([[turn_rad, n @ centre]])
     return Segments(
-        line, cov[None], ends[None], np.array([[0, 5]]), np.array([6]), np.zeros((1, 2), int), np.zeros(1), SURE
+        line, cov[None], ends[None], np.array([[0, 5]]), np.array([6]), np.zeros((1, 2), bool), np.zeros(1), SURE
     )
 
 
@@ -105,7 +107,7 @@ def test_a_segment_and_its_wall_overlap_by_more_than_a_touch(overlap_m, is_match
         ends,
         np.array([[0, 9]]),
         np.array([10]),
-        np.zeros((1, 2), int),
+        np.zeros((1, 2), bool),
         np.zeros(1),
         SURE,
     )

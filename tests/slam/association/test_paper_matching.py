@@ -54,9 +54,9 @@ def scene(rng, count=7, correlated=True):
         ends.append(r * u + np.outer([middle - 0.3, middle + 0.3], v))
     few = np.zeros(count, dtype=bool)
     beams = np.tile([0, 9], (count, 1))
-    kinds = np.zeros((count, 2), dtype=np.int64)
+    apart = np.zeros((count, 2), dtype=bool)
     segments = Segments(
-        np.array(lines), np.array(covs), np.array(ends), beams, np.full(count, 10), kinds, np.zeros(count), few
+        np.array(lines), np.array(covs), np.array(ends), beams, np.full(count, 10), apart, np.zeros(count), few
     )
     return segments, KnownWalls(IDS, extents), joint
 

@@ -31,7 +31,7 @@ def segments_at(pose, rng, walls=WALLS):
     a = 0.002**2
     cov = np.array([[[a, t * a], [t * a, 0.003**2 + t**2 * a]] for t in t0])
     return Segments(
-        lines, cov, ends, np.zeros((n, 2), dtype=np.int64), np.full(n, 20), np.zeros((n, 2), dtype=np.int64),
+        lines, cov, ends, np.zeros((n, 2), dtype=np.int64), np.full(n, 20), np.zeros((n, 2), dtype=bool),
         np.zeros(n), np.zeros(n, dtype=bool),
     )  # fmt: skip
 

@@ -47,7 +47,7 @@ def a_scan(seed):
     cov[:, 0, 1] = cov[:, 1, 0] = 1e-4 * foot
     count = len(seen)
     beams, sure = np.zeros((count, 2), dtype=np.int64), np.zeros(count, dtype=bool)
-    segments = Segments(lines, cov, ends, beams, np.full(count, 20), beams, np.zeros(count), sure)
+    segments = Segments(lines, cov, ends, beams, np.full(count, 20), beams > 0, np.zeros(count), sure)
     return segments, walls, joint, ends_world
 
 

@@ -91,7 +91,7 @@ def test_segments_are_those_of_the_same_walls_seen_from_the_body():
     lines[flip] = np.column_stack([lines[flip, 0] + np.pi, -lines[flip, 1]])
     cov = np.array([[[1e-4, 3e-5], [3e-5, 2e-5]], [[2e-4, -1e-5], [-1e-5, 4e-5]]])
     none = np.zeros(2, dtype=np.int64)
-    segments = Segments(lines, cov, seen, np.zeros((2, 2), dtype=np.int64), none, np.zeros((2, 2), dtype=np.int64),
+    segments = Segments(lines, cov, seen, np.zeros((2, 2), dtype=np.int64), none, np.zeros((2, 2), dtype=bool),
                         np.zeros(2), np.zeros(2, dtype=bool))  # fmt: skip
     on_body = segments.on_body(SCANNER)
     np.testing.assert_allclose(on_body.ends, faces, atol=1e-12)

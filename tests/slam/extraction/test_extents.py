@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from chainslam.slam.estimation.shared import SharedConfig
 from chainslam.slam.extraction.config import ExtractionConfig
 from chainslam.slam.extraction.extract import extract
-from chainslam.slam.extraction.segments import EndKind
 from chainslam.slam.extraction.visible_extent import sure_pieces
 from tests.slam.extraction.test_extract import room_scan
 
@@ -49,4 +48,4 @@ def test_an_end_is_the_last_point_where_beams_stand_close_and_no_leap_beyond_the
             elif apart(line, np.array([np.cos(line[0]), np.sin(line[0])])) <= CONFIG.shared.door_m:
                 assert abs(apart(line, shown) - CONFIG.shared.door_m) < 1e-6
             same = np.allclose(shown, segments.ends[k, end], atol=1e-12)
-            assert believed.end_kinds[k, end] == (segments.end_kinds[k, end] if same else EndKind.OPEN)
+            assert believed.at_corner[k, end] == (segments.at_corner[k, end] and same)

@@ -8,7 +8,6 @@ from chainslam.sim.lidar import LidarConfig, RangeFinder, beam_sigmas, noisy
 from chainslam.slam.extraction.config import ExtractionConfig
 from chainslam.slam.extraction.extract import beams_of_scan, extract, rules_of
 from chainslam.slam.extraction.kernels.returns_kernels import returns_of, rolled
-from chainslam.slam.extraction.segments import EndKind
 from chainslam.slam.map.profiles import Profiles
 from chainslam.slam.robot import Scan
 from tests.slam.extraction.test_extract import CLOSED
@@ -58,19 +57,6 @@ def test_a_stretch_of_noisier_beams_is_no_break():
         segments = extract(Scan(finder.bearings_rad, measured, sigmas, 4.0, 0.0))
         found.append(len(segments.lines))
     assert np.mean(found) < 1.05
-
-
-@pytest.mark.parametrize("sure", [False, True])
-def test_an_end_hidden_by_something_nearer_is_told_by_the_noise_of_the_beam_that_met_it(sure):
-    """Three sigmas nearer than the line hides it; what the beam says of itself counts, not what the others do."""
-    bearings = np.linspace(-0.5, 0.5, 41)
-    ranges = 2.0 / np.cos(bearings)
-    ranges[30:] = ranges[30:] - 0.12
-    sigmas = np.where(np.arange(41) < 30, 0.005, 0.005 if sure else 0.05)
-    segments = extract(Scan(bearings, ranges, sigmas, 4.0, 0.0))
-    assert len(segments.lines)
-    hidden = segments.end_kinds[0, 1] == int(EndKind.OCCLUDED)
-    assert hidden == sure
 
 
 def test_noise_that_grows_with_the_range_breaks_no_wall():

@@ -219,12 +219,3 @@ def test_the_nearer_of_two_tails_is_joined():
 def test_an_empty_map_has_no_chains():
     assert connect(map_of(np.zeros((0, 2, 2)))) == ()
     assert connect(map_of(gap_of(0.0), tentative=np.array([True, True]))) == ()
-
-
-@pytest.mark.parametrize(
-    ("gap", "are_one"), [((0.06, 0.0), True), ((0.09, 0.0), False), ((0.09, 0.01), False), ((0.04, 0.08), True)]
-)
-def test_walls_on_one_line_join_only_where_no_wall_fits_between_them_or_beside_each_other(gap, are_one):
-    """Two rooms' walls on one line face each other across the end of the wall between, 0.1 m thick, mapped thinner."""
-    walls = np.array([[[0.0, 0.0], [1.0, 0.0]], np.array([1.0, 0.0]) + gap + np.array([[0.0, 0.0], [1.0, 0.02]])])
-    assert len(connect(map_of(walls))) == 2 - are_one

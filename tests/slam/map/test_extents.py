@@ -8,7 +8,6 @@ import pytest
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.estimation.backend import Belief, Joint
 from chainslam.slam.extraction.extract import extract
-from chainslam.slam.extraction.segments import EndKind
 from chainslam.slam.geometry.lines import normals, through
 from chainslam.slam.map.extents import WallsConfig
 from chainslam.slam.map.landmarks import Landmarks
@@ -167,46 +166,3 @@ def test_a_wall_shorter_than_its_ends_are_known_is_none(length_m, is_kept):
     segments.ends[0, :, 1] = [-0.5 * length_m, 0.5 * length_m]
     forgotten = walls.observe(belief_of([face], pose), scan, segments, np.zeros(1, dtype=np.int64)).forgotten
     assert forgotten.tolist() == ([] if is_kept else [0])
-
-
-CAP = [[0.0, 0.0], [0.12, 0.0]]
-"""The end of a wall, seen from above."""
-ABOVE = (0.06, 0.5, 0.0)
-
-
-def looked(walls, times, shown=(CAP,), at=0, known=CAP):
-    """Return whether the wall, a line through `known`, is seen whole after more looks; segment `at` is its own."""
-    for _ in range(times):
-        owners = [-1] * len(extract(scan_of(shown, ABOVE)))
-        owners[at] = 0
-        see(walls, [known], shown, owners, ABOVE)
-    return walls.map(belief_of([known], ABOVE)).whole.tolist() == [True]
-
-
-def test_a_wall_is_seen_whole_where_nothing_hides_its_ends():
-    walls = Landmarks(*SETTINGS)
-    assert not looked(walls, CONFIG.shared.scans - 1)
-    assert looked(walls, 1)
-
-
-def test_a_wall_whose_end_is_hidden_may_go_on():
-    before = [[0.1, 0.25], [0.3, 0.25]]
-    kinds = extract(scan_of((CAP, before), ABOVE)).end_kinds
-    at = int(np.flatnonzero((kinds == EndKind.OCCLUDED).any(axis=1))[0])
-    assert not looked(Landmarks(*SETTINGS), 10, (CAP, before), at)
-
-
-def test_a_wall_that_turns_out_longer_was_not_seen_whole():
-    walls = Landmarks(*SETTINGS)
-    assert looked(walls, 5)
-    longer = [[0.0, 0.0], [0.4, 0.0]]
-    assert not looked(walls, 1, (longer,))
-    assert looked(walls, 1, (longer,))
-
-
-def test_of_two_walls_that_are_one_it_is_not_known_whether_they_were_seen_whole():
-    walls = Landmarks(*SETTINGS)
-    assert looked(walls, 5)
-    walls.records.rows(np.array([0, 1]))
-    walls.records.merge(0, 1, 0.0)
-    assert walls.records.columns["whole"].tolist() == [0]

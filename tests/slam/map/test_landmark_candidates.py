@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainslam.sim.lidar import LidarConfig, RangeFinder
-from chainslam.slam.extraction.segments import EndKind, Segments
+from chainslam.slam.extraction.segments import Segments
 from chainslam.slam.geometry.lines import through
 from chainslam.slam.geometry.poses import to_robot
 from chainslam.slam.map.existence import ExistenceConfig, LandmarkCandidates
@@ -27,9 +27,9 @@ def look(face_world: np.ndarray, pose_world: np.ndarray, rng: np.random.Generato
     var_alpha, var_across = 2 * SIGMA_M**2 / length**2, SIGMA_M**2 / 2
     # The line's distance from the robot's origin changes with its direction by the lever to its middle.
     cov = np.array([[[var_alpha, along * var_alpha], [along * var_alpha, var_across + along**2 * var_alpha]]])
-    kinds = np.full((1, 2), int(EndKind.OPEN))
+    apart = np.zeros((1, 2), bool)
     return Segments(
-        line, cov, noisy[None], np.array([[0, beams - 1]]), np.array([beams]), kinds, np.zeros(1), np.array([beams < 5])
+        line, cov, noisy[None], np.array([[0, beams - 1]]), np.array([beams]), apart, np.zeros(1), np.array([beams < 5])
     )
 
 

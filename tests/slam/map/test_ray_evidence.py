@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.extraction.config import ExtractionConfig
 from chainslam.slam.extraction.extract import extract
-from chainslam.slam.extraction.segments import EndKind
 from chainslam.slam.extraction.visible_extent import sure_pieces
 from chainslam.slam.geometry.lines import normals, through
 from chainslam.slam.map.kernels.ray_evidence import RayEvidence, ray_evidence
@@ -106,7 +105,7 @@ def test_sure_pieces_never_lengthen_a_segment(seed):
     assert np.all(after[:, 0] >= before[:, 0] - 1e-9)
     assert np.all(after[:, 1] <= before[:, 1] + 1e-9)
     assert np.all(after[:, 0] <= after[:, 1] + 1e-9)
-    assert np.all(sure.end_kinds[~leap] == segments.end_kinds[~leap])
+    assert np.all(sure.at_corner[~leap] == segments.at_corner[~leap])
 
 
 def test_a_wall_seen_at_a_grazing_angle_is_sure_only_where_its_beams_stand_close():
@@ -127,10 +126,10 @@ def test_a_corner_far_beyond_the_last_beam_was_not_seen(leap_m, is_believed):
     segments = extract(scan)
     last = np.tan(scan.bearings_rad[segments.beams[0, 1]])
     segments.ends[0, 1] = [1.0, last + leap_m]
-    segments.end_kinds[0, 1] = EndKind.CORNER
+    segments.at_corner[0, 1] = True
     sure = sure_pieces(segments, scan, ExtractionConfig())
     np.testing.assert_allclose(sure.ends[0, 1], [1.0, last + leap_m * is_believed], atol=1e-6)
-    assert sure.end_kinds[0, 1] == (EndKind.CORNER if is_believed else EndKind.OPEN)
+    assert sure.at_corner[0, 1] == is_believed
 
 
 def test_a_wall_across_the_seam_has_as_many_beams_as_anywhere_else():

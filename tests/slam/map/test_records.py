@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainslam.slam.estimation.backend import Belief, Joint
-from chainslam.slam.extraction.segments import EndKind, Segments
+from chainslam.slam.extraction.segments import Segments
 from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.extents import WallsConfig
 from chainslam.slam.map.landmarks import Landmarks
@@ -93,7 +93,7 @@ def observations(rng, count, turn_rad=0.0):
         ends=ends,
         beams=np.column_stack([np.arange(count), np.arange(count) + 8]),
         beam_counts=np.full(count, 9),
-        end_kinds=np.full((count, 2), EndKind.CORNER, dtype=np.int64),
+        at_corner=np.ones((count, 2), dtype=bool),
         chi2=rng.chisquare(7, count),
         is_tentative=np.zeros(count, dtype=bool),
     )

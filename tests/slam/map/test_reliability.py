@@ -51,7 +51,7 @@ def observation(alpha, sigma_rad, beams=6, chi2=None, length_m=1.0):
     ends, none = np.array([[[1.0, 0.0], [1.0, length_m]]]), np.zeros((1, 2), dtype=int)
     chi2 = beams - 2.0 if chi2 is None else chi2
     return Segments(
-        np.array([[alpha, 1.0]]), cov, ends, none, np.array([beams]), none, np.array([chi2]), np.array([beams < 5])
+        np.array([[alpha, 1.0]]), cov, ends, none, np.array([beams]), none > 0, np.array([chi2]), np.array([beams < 5])
     )
 
 

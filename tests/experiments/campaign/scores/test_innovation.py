@@ -36,7 +36,7 @@ def seen(lines, sigma_rad=0.01):
         np.stack([foot - 2.0 * along, foot + 2.0 * along], axis=1),
         none,
         np.full(count, 20),
-        none,
+        none > 0,
         np.zeros(count),
         np.zeros(count, bool),
     )

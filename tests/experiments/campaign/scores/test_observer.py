@@ -35,7 +35,7 @@ def segments_of(ends_world, beams, counts=None, pose=POSE):
     n = len(ends)
     counts = np.full(n, 9) if counts is None else np.array(counts)
     return Segments(through(ends), np.tile(1e-6 * np.eye(2), (n, 1, 1)), ends, np.array(beams).reshape(-1, 2), counts,
-                    np.zeros((n, 2), int), np.zeros(n), counts < 5)  # fmt: skip
+                    np.zeros((n, 2), bool), np.zeros(n), counts < 5)  # fmt: skip
 
 
 @pytest.fixture
