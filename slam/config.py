@@ -8,6 +8,7 @@ from .association.recovery import RecoveryConfig
 from .estimation.shared import SharedConfig
 from .extraction.config import ExtractionConfig
 from .map.extents import WallsConfig
+from .map.merging import MergingConfig
 from .robot import RobotSpec, fitted, of_robot
 
 
@@ -21,8 +22,8 @@ class MapperConfig:
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     walls: WallsConfig = field(default_factory=WallsConfig)
-    merging: bool = True
-    """Merge walls that are in the map twice, and end walls where they bend."""
+    merging: MergingConfig | None = field(default_factory=MergingConfig)
+    """Without it, one wall may be in the map twice, and walls run on past the place where they bend."""
     recovery: RecoveryConfig | None = field(default_factory=RecoveryConfig)
     """Without it, the odometry is always believed."""
     ranges: RangesConfig = field(default_factory=RangesConfig)

@@ -79,6 +79,10 @@ class MapKeeper:
         """Return the map as it is now."""
         return self.landmarks.map(self.backend.belief)
 
+    def follow(self) -> None:
+        """Let the ends of walls move along with the map, where an update moved it."""
+        self.landmarks.extents.follow(self.backend.belief)
+
     def store(
         self, scan: Scan, segments: Segments, matches: Matches
     ) -> tuple[StochasticMap, Int[np.ndarray, " s"], tuple[tuple[int, int], ...]]:
@@ -139,7 +143,7 @@ class MapKeeper:
     def _ended_at_bends(self, range_m: float) -> StochasticMap:
         """Let walls end where they bend, within range; return the map, which is as it was where walls never merge."""
         walls = self.map()
-        if not self.config.merging:
+        if self.config.merging is None:
             return walls
         pairs, along = ends_at_bends(walls, range_m, self.config.matching.one_wall, self.config.shared)
         if not len(pairs):
@@ -151,10 +155,10 @@ class MapKeeper:
         self, owners: Int[np.ndarray, " s"], walls: StochasticMap
     ) -> tuple[StochasticMap, tuple[tuple[int, int], ...]]:
         """Make one of two walls that lie along each other, if their joint covariance agrees; return them, too."""
-        if not self.config.merging:
+        if self.config.merging is None:
             return walls, ()
         merged: list[tuple[int, int]] = []
-        while twice := duplicate_of(walls, owners, self.config.matching.one_wall, self.config.shared):
+        while twice := duplicate_of(walls, owners, self.config.matching.one_wall, self.config.merging):
             keep, drop = twice
             self.landmarks.merge(self.backend.belief, keep, drop)
             self.backend.merge(keep, drop)

@@ -161,6 +161,7 @@ class Mapper:
             self._is_lost = self.config.recovery is not None  # Else nobody would look for its place.
             return self._nothing_taken_in(segments, self._keeper.map())
         self._left_out = 0
+        self._keeper.follow()
         walls, owners, merged = self._keeper.store(scan, segments, matches)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         self._chains = connect(walls, set_aside, self.config.shared)

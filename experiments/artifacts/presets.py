@@ -44,7 +44,7 @@ METHODS: dict[str, MethodPreset] = {
         backend="block-ekf",
         mapper=(
             (MATCHING, "paper"),
-            ("mission.mapper.merging", False),
+            ("mission.mapper.merging", None),
         ),
         driving=((FOLLOWING, "paper"), (NAVIGATION, "visibility"), (SWEEP, False)),
     ),

@@ -237,4 +237,4 @@ def replay(
 
 def _without_housekeeping(config: MapperConfig) -> MapperConfig:
     """Return a mapper that never deletes, splits or merges a wall: with true association nothing needs repair."""
-    return replace(config, walls=replace(config.walls, housekeeping=False), merging=False)
+    return replace(config, walls=replace(config.walls, housekeeping=False), merging=None)

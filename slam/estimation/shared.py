@@ -40,6 +40,9 @@ class SharedConfig:
     far_m: Distance = 0.5
     """Largest distance between neighbouring beams on one wall, and between a wall and a segment that is compared with
     it."""
+    long_m: Distance = 1.0
+    """Overlap from which two walls beside each other may be one, and length from which a wall shows how the map has
+    moved."""
     known_rad: Spread = float(np.deg2rad(1.0))
     """Standard deviation up to which the angle between two walls counts as known."""
     straight_rad: Angle = float(np.deg2rad(5.0))

@@ -10,7 +10,9 @@ from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..robot import Scan
+from .displacement import along
 from .existence import JUST_BEGUN, ExistenceConfig
+from .kernels import wall_kernels
 from .kernels.existence_kernels import look
 from .kernels.extent_kernels import contradict, take_in
 from .records import Merger, Records
@@ -52,12 +54,26 @@ class Extents:
         self._records.declare(
             self._merge,
             extents=np.array([np.inf, -np.inf]),
+            placed=np.full(2, np.nan),
             spacing=np.full(2, np.inf),
             observations=0,
             against=0,
             log_odds=self._believed,
             place=JUST_BEGUN,
         )
+
+    def follow(self, belief: Belief) -> None:
+        """Move extents along with the map, where long walls have moved by more than ends are known to."""
+        columns, shared = self._records.columns, self._config.shared
+        self._records.rows(belief.ids)
+        placed, extents, long_m = columns["placed"], columns["extents"], float(shared.long_m)
+        tell, ends_world, moved_m = wall_kernels.moved(placed, extents, belief.anchors, belief.means, long_m)
+        if not len(tell) or np.abs(moved_m).max() <= shared.resolution_m:
+            return
+        seen = np.flatnonzero(extents[:, 0] <= extents[:, 1])
+        middles = wall_kernels.ends_world(belief.anchors[seen], placed[seen], extents[seen]).mean(axis=1)
+        extents[seen] += along(middles, placed[seen, 0], ends_world, placed[tell, 0], moved_m, long_m)[:, None]
+        placed[:] = belief.means
 
     def map(
         self,

@@ -56,5 +56,5 @@ def test_a_default_is_what_may_be_typed_and_a_range_is_short(key, cells):
 
 
 def test_a_group_that_may_be_left_out_says_how_and_what_then():
-    assert "`--set mission.mapper.recovery=null` switches this off. Without it," in PAGE.read_text()
-    assert PAGE.read_text().count("=null` switches this off.") == 3
+    assert "`--set mission.mapper.merging=null` switches this off. Without it," in PAGE.read_text()
+    assert PAGE.read_text().count("=null` switches this off.") == 4

@@ -18,10 +18,10 @@ def lying_along(
     extents: Float[np.ndarray, "n 2"],
     turn_cosine: float,
     across_m: float,
-) -> Int[np.ndarray, "p 2"]:
+) -> tuple[Int[np.ndarray, "p 2"], Float[np.ndarray, "p 3"]]:
     """Return the rows of trusted walls that lie along each other, one of them among those of ids `touched`, ascending.
 
-    The shorter of two lies no farther across the longer than `across_m`, and overlaps it by as much.
+    And the length of the shorter of each two, how far it lies across the longer, and by how much they overlap, m.
     """
     n, alpha, lengths = len(means), means[:, 0], extents[:, 1] - extents[:, 0]
     is_ours = np.zeros(n, np.bool_)
@@ -30,7 +30,7 @@ def lying_along(
         if row < n and ids[row] == wall:
             is_ours[row] = True
     ours, everyone = np.flatnonzero(is_ours), np.arange(n)
-    pairs, count = np.empty((8, 2), np.int64), 0
+    pairs, beside, count = np.empty((8, 2), np.int64), np.empty((8, 3)), 0
     for older in range(n):
         for younger in everyone[older + 1 :] if is_ours[older] else ours:
             if younger <= older or tentative[older] or tentative[younger]:
@@ -47,9 +47,11 @@ def lying_along(
             if across <= across_m and overlap >= across_m:
                 if count == len(pairs):
                     pairs = np.concatenate((pairs, np.empty((count, 2), np.int64)))
+                    beside = np.concatenate((beside, np.empty((count, 3))))
                 pairs[count, 0], pairs[count, 1] = older, younger
+                beside[count, 0], beside[count, 1], beside[count, 2] = lengths[shorter], across, overlap
                 count += 1
-    return pairs[:count].copy()
+    return pairs[:count].copy(), beside[:count].copy()
 
 
 @compiled

@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ...geometry.compiled import compiled
 from ...geometry.numerics import TINY
@@ -34,3 +34,37 @@ def distances(point_world: Float[np.ndarray, "2"], ends: Float[np.ndarray, "n 2 
         share = min(max(share, 0.0), 1.0)
         found[k] = math.hypot(x - share * along_x, y - share * along_y)
     return found
+
+
+@compiled
+def across(
+    ends: Float[np.ndarray, "n 2 2"], anchors: Float[np.ndarray, "n 2"], means: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, "n 2"]:
+    """Return how far (m) beyond its two ends, along its normal, the line (alpha rad, d m) of each wall lies now."""
+    found = np.empty((len(means), 2))
+    for k in range(len(means)):
+        nx, ny = math.cos(means[k, 0]), math.sin(means[k, 0])
+        for end in range(2):
+            x, y = ends[k, end, 0] - anchors[k, 0], ends[k, end, 1] - anchors[k, 1]
+            found[k, end] = means[k, 1] - (nx * x + ny * y)
+    return found
+
+
+@compiled
+def moved(
+    placed: Float[np.ndarray, "n 2"],
+    extents: Float[np.ndarray, "n 2"],
+    anchors: Float[np.ndarray, "n 2"],
+    means: Float[np.ndarray, "n 2"],
+    long_m: float,
+) -> tuple[Int[np.ndarray, " t"], Float[np.ndarray, "t 2 2"], Float[np.ndarray, "t 2"]]:
+    """Return the long walls, where their ends lie by the lines on which they were `placed`, and how far `across` these.
+
+    A wall that was placed nowhere yet is placed on its line.
+    """
+    for k in range(len(placed)):
+        if math.isnan(placed[k, 0]):
+            placed[k] = means[k]
+    tell = np.flatnonzero(extents[:, 1] - extents[:, 0] >= long_m)
+    ends = ends_world(anchors[tell], placed[tell], extents[tell])
+    return tell, ends, across(ends, anchors[tell], means[tell])

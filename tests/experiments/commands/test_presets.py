@@ -49,7 +49,7 @@ def test_an_option_goes_before_set_and_that_before_a_file_and_that_before_the_pr
         "paper",
         "visibility",
     )
-    assert (mapper.merging, explorer.sweep) == (False, False)
+    assert (mapper.merging, explorer.sweep) == (None, False)
     path = tmp_path / "some.json"
     path.write_text(json.dumps({"backend": "graph", "mission": {"mapper": {"matching": {"method": "joint"}}}}))
     file = (*PRESET, "--config", str(path))

@@ -68,9 +68,9 @@ def test_navigation_is_a_setting_of_runs_and_campaigns(run, tmp_path, capsys):
 
 
 def test_a_group_that_may_be_none_is_switched_off_and_stays_so():
-    settled = campaign("--set", "mission.mapper.recovery=null", "--set", f"{GATE}=0.9")
+    settled = campaign("--set", "mission.mapper.merging=null", "--set", f"{GATE}=0.9")
     trial = config_of(settled, Trial("paper-fig8", "nearest-robot", "graph", CLOSED, 1))
-    assert trial.mission.mapper.recovery is None
+    assert trial.mission.mapper.merging is None
     assert gate_of(settled) == trial.mission.mapper.matching.gate == 0.9
     assert gate_of(campaign()) == 0.99
     # The command that a report names makes the same campaign.

@@ -17,6 +17,7 @@ from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.bends import ends_at_bends
 from chainslam.slam.map.extents import WallsConfig
 from chainslam.slam.map.landmarks import Landmarks
+from chainslam.slam.map.merging import MergingConfig
 from chainslam.slam.map_keeper import MapKeeper
 from tests.slam.map.maps import map_of
 
@@ -114,7 +115,7 @@ def test_a_wall_of_which_nothing_would_be_left_stays_as_it_is(left_m, is_left):
 def test_walls_that_never_merge_never_end_at_bends(monkeypatch):
     """As in the paper, which knows neither."""
     walls = known(bent(6.0))
-    for merging, ends_at_m in ((True, 0.0), (False, -0.3)):
+    for merging, ends_at_m in ((MergingConfig(), 0.0), (None, -0.3)):
         keeper = MapKeeper(BACKENDS["full-ekf"].make(np.zeros(3), np.eye(3)), MapperConfig(merging=merging))
         keeper.landmarks.records.rows(walls.ids)
         extents = keeper.landmarks.records.columns["extents"]
