@@ -92,7 +92,7 @@ def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMem
     given_up = GivenUp()
     path_length, index = 0.0, 0
     while True:
-        began_s = time.thread_time() - compiling_s()
+        began_s = _computing_s()
         sensed = robot.sense() if floor is None else lost.believed(robot.sense())
         update = mapper.step(sensed, given_up.keys)
         scan = sensed if update.heard is None else update.heard.scan
@@ -103,7 +103,7 @@ def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMem
                 floor.move(localisation.unstated_motion)
         if floor is not None and not localisation.is_lost:
             floor.see(update.map.belief.pose_world, scan)
-        decides_s = time.thread_time()
+        decides_s = _computing_s()
         seen = sorted({wall for wall in update.walls_of_segments.tolist() if wall >= 0})
         if not localisation.is_lost:
             graph.observe(update.map, update.chains, followed_wall(update.map), seen)
@@ -124,7 +124,7 @@ def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMem
         given_up = decision.given_up
         if decision.outcome is Outcome.ALL_CLOSED and not update.chains:
             decision = replace(decision, outcome=Outcome.NO_WALL, words="no wall was found")
-        decided_s = time.thread_time()
+        decided_s = _computing_s()
         yield Step(
             index=index,
             time_s=scan.time_s,
@@ -141,7 +141,7 @@ def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMem
             graph=graph.graph,
             decision=decision,
             path_length_m=path_length,
-            seconds=decided_s - compiling_s() - began_s,
+            seconds=decided_s - began_s,
             planning_seconds=decided_s - decides_s,
             robot=spec,
             own_beams=0 if update.heard is None else update.heard.own_beams,
@@ -159,3 +159,8 @@ def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMem
         recent.move(odometry)
         path_length += odometry.path_m
         index += 1
+
+
+def _computing_s() -> float:
+    """Return the processor's time of this thread, s, without what it compiled in."""
+    return time.thread_time() - compiling_s()

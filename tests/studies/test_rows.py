@@ -79,8 +79,7 @@ def test_a_row_has_times_along_the_run_memory_and_survives_json():
     assert row == json.loads(json.dumps(row))
     assert row["status"] == "stopped"
     assert len(row["step_ms_along"]) == PARTS
-    assert row["planning_ms_mean"] > 0.0
-    assert row["step_ms_mean"] > 0.0
+    assert 0.0 < row["planning_ms_mean"] < row["step_ms_mean"]
     assert 20.0 < row["peak_mib"] < 2048.0
 
 
